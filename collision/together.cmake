@@ -1,12 +1,12 @@
 supple_together(
-  "src/surface/apex.cpp src/pairs/approach.cpp src/pairs/bodies.cpp src/pairs/body_order.cpp src/deform/bulge.cpp src/deform/bulge_volume.cpp
-   src/surface/contact_surface.cpp src/pairs/cores.cpp src/surface/flat_cells.cpp"
-  "src/surface/cross_kinks.cpp src/surface/find_peak.cpp src/response/linearise.cpp src/surface/march_feet.cpp"
-  "src/deform/deformed_field.cpp src/pairs/find_contacts.cpp src/surface/pair_pressure.cpp src/surface/polar_cover.cpp src/surface/symmetry.cpp"
-  "src/surface/imprint.cpp src/surface/pair_solver.cpp src/surface/quadrature.cpp"
-  "src/surface/march_kinks.cpp src/surface/march_pieces.cpp src/surface/mild_rule.cpp src/surface/polar_patches.cpp"
-  "src/surface/march_rule.cpp src/response/react.cpp"
-  "src/surface/middle_rule.cpp src/pairs/sleep.cpp src/surface/smooth_bound.cpp src/surface/touch_kinks.cpp"
-  "src/surface/polar_columns.cpp src/surface/rim_corners.cpp src/surface/squeezed_region.cpp"
-  "src/surface/polar_rule.cpp src/response/stick.cpp src/surface/third_bodies.cpp"
-  "src/surface/sample_rule.cpp src/surface/sigma_mesh.cpp")
+  "src/surface/polar/apex.cpp src/pairs/approach.cpp src/pairs/bodies.cpp src/pairs/body_order.cpp src/deform/bulge.cpp src/deform/bulge_volume.cpp
+   src/surface/contact_surface.cpp src/pairs/cores.cpp src/surface/march/flat_cells.cpp"
+  "src/surface/polar/cross_kinks.cpp src/surface/find_peak.cpp src/response/linearise.cpp src/surface/march/march_feet.cpp"
+  "src/deform/deformed_field.cpp src/pairs/find_contacts.cpp src/surface/pair_pressure.cpp src/surface/polar/polar_cover.cpp src/surface/polar/symmetry.cpp"
+  "src/surface/polar/imprint.cpp src/surface/pair_solver.cpp src/surface/quadrature.cpp"
+  "src/surface/march/march_kinks.cpp src/surface/march/march_pieces.cpp src/surface/polar/mild_rule.cpp src/surface/polar/polar_patches.cpp"
+  "src/surface/march/march_rule.cpp src/response/react.cpp"
+  "src/surface/polar/middle_rule.cpp src/pairs/sleep.cpp src/surface/polar/smooth_bound.cpp src/surface/polar/touch_kinks.cpp"
+  "src/surface/region/polar_columns.cpp src/surface/polar/rim_corners.cpp src/surface/region/squeezed_region.cpp"
+  "src/surface/polar/polar_rule.cpp src/response/stick.cpp src/surface/third_bodies.cpp"
+  "src/surface/march/sample_rule.cpp src/surface/march/sigma_mesh.cpp")

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "supple/core/error.h"
-#include "surface/energy_columns.h"
+#include "surface/region/energy_columns.h"
 
 namespace supple::collision {
 namespace {

@@ -10,7 +10,7 @@
 #include "pairs/body_order.h"
 #include "pairs/boxes.h"
 #include "pairs/cores.h"
-#include "surface/symmetry.h"
+#include "surface/polar/symmetry.h"
 
 namespace supple::collision {
 namespace {

@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "supple/collision/find_contacts.h"
-#include "surface/imprint.h"
-#include "surface/march_rule.h"
+#include "surface/march/march_rule.h"
+#include "surface/march/sample_rule.h"
 #include "surface/pair_result.h"
-#include "surface/panel_rule.h"
-#include "surface/polar_patches.h"
-#include "surface/sample_rule.h"
-#include "surface/squeezed_region.h"
+#include "surface/panels/panel_rule.h"
+#include "surface/polar/imprint.h"
+#include "surface/polar/polar_patches.h"
+#include "surface/region/squeezed_region.h"
 #include "surface/third_bodies.h"
 
 namespace supple::collision {

@@ -232,7 +232,7 @@ void LargestValues::set(const BlockCoord& block, const SampledLeaf& sampled) {
 }
 
 float LargestValues::of_all() const {
-  float largest = 0.0F;
+  float largest = 0.0F;  // the same in any order
   for (const auto& [block, value] : by_leaf_) largest = std::max(largest, value);
   return largest;
 }

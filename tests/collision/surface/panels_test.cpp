@@ -5,8 +5,8 @@
 #include <numbers>
 #include <vector>
 
-#include "../../collision/src/surface/level_roots.h"
-#include "../../collision/src/surface/panel_corners.h"
+#include "../../collision/src/surface/panels/level_roots.h"
+#include "../../collision/src/surface/panels/panel_corners.h"
 #include "collision/bodies.h"
 #include "supple/implicit/solids.h"
 

@@ -398,7 +398,7 @@ void add_piece(std::span<const Claim> claims, const Lattice& fine, const NodeSet
   for (const Node& node : part) {
     for (unsigned c = 0; c < 8; ++c) cells.push_back(corner_of(node, c, -1));
   }
-  std::sort(cells.begin(), cells.end(), before);
+  std::sort(cells.begin(), cells.end(), before);  // `part` has no order
   cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
   const bool body = own != 0;  // or a cavity in one
   const Label inner = body ? own : beyond, outer = body ? beyond : 0;

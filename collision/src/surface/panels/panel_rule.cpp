@@ -1,0 +1,448 @@
+#include "surface/panels/panel_rule.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace supple::collision {
+namespace {
+
+constexpr double kLeastCosine = 0.3;  // between the normals of a graph and its rays
+constexpr std::size_t kMostPanels = 4096;
+constexpr int kMostDepth = 24;
+constexpr double kSafety = 2.0;               // of estimates: two orders may both miss something
+
+/// What panels are held to: force, area, and first moment of the load about its centre.
+struct Errors {
+  Vec3 force = Vec3::Zero(), first = Vec3::Zero();
+  double area = 0.0, force_square = 0.0, first_square = 0.0, area_square = 0.0, missed_load = 0.0, missed_area = 0.0;
+};
+
+double least_cosine(std::span<const Vec3> normals, const Vec3& axis) {
+  double least = 1.0;
+  for (const Vec3& n : normals) least = std::min(least, n.dot(axis));
+  return least;
+}
+
+/// The axis from which all normals are seen best: their mean, or, where some lie far from it, near the axis of the narrowest cone around them, by steps
+/// towards the farthest one that become shorter (Badoiu and Clarkson 2003).
+Vec3 middle_of(std::span<const Vec3> normals, const Vec3& sum) {
+  constexpr double kSeenWell = 0.7;
+  constexpr int kSteps = 64;
+  Vec3 axis = sum.norm() > 0.0 ? Vec3(sum.normalized()) : normals.front();
+  Vec3 best = axis;
+  double seen = least_cosine(normals, axis);
+  for (int step = 1; step <= kSteps && seen < kSeenWell; ++step) {
+    const Vec3& farthest = *std::min_element(normals.begin(), normals.end(), [&](const Vec3& p, const Vec3& q) { return p.dot(axis) < q.dot(axis); });
+    const Vec3 moved = axis + (farthest - axis) / (step + 1.0);
+    if (!(moved.norm() > 0.0)) break;
+    axis = moved.normalized();
+    const double cosine = least_cosine(normals, axis);
+    if (cosine <= seen) continue;
+    seen = cosine;
+    best = axis;
+  }
+  return best;
+}
+
+class PanelSolver {
+ public:
+  PanelSolver(const PanelJob& job, PanelRoom& room)
+      : job_(job), r_(room), setting_{{job.pressure, {}, 0.5 * std::min(job.pressure.feature_size(), job.overlap.extent().norm())}, {job.third, {}}, order_of(job.error), 0.0, 0.1 * std::sqrt(job.error), job.reference} {}
+
+  bool solve(PatchPoints& points, PanelOutcome& out);
+
+ private:
+  /// Gauss points of a line: two more digits of the error ask for one more.
+  static int order_of(double error) { return std::clamp(static_cast<int>(std::lround(2.0 - 0.5 * std::log10(error))), 3, 8); }
+
+  bool find_frame();
+  void start();
+  void add_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, bool walls, const Panel* parent);
+  void choose_axes(std::size_t first);
+  [[nodiscard]] Box box_of(const Panel& panel) const;
+  void set_levels(Panel& panel);
+  [[nodiscard]] bool crosses(const implicit::Kink& kink, const Panel& panel) const;
+  void measure(std::size_t first);
+  void look_for_starts(Panel& panel) const;
+  [[nodiscard]] double estimate();
+  [[nodiscard]] double error_of(const Panel& panel) const;
+  bool choose();
+  void refine();
+  void split(const Panel& panel, std::size_t axis, double place, bool walls);
+  [[nodiscard]] bool try_to_cut(Panel& panel);
+  [[nodiscard]] bool has_one_sheet();
+  void hand_over(PatchPoints& points, PanelOutcome& out);
+
+  const PanelJob& job_;
+  PanelRoom& r_;
+  PanelSetting setting_;
+  bool graph_ = true;
+  bool kinks_known_ = false;
+  PatchSums all_;
+};
+
+/// The frame whose last axis is the mean normal where the bodies press, and whether Sigma seems to be a graph over it.
+bool PanelSolver::find_frame() {
+  PressureBatch& batch = r_.batch;
+  batch.resize(job_.starts.size());
+  std::copy(job_.starts.begin(), job_.starts.end(), batch.point.begin());
+  job_.pressure.evaluate(batch);
+  Vec3 place = Vec3::Zero(), normal = Vec3::Zero();
+  std::vector<Vec3>& normals = r_.normal;
+  normals.clear();
+  double all = 0.0, depth = 0.0;
+  const auto weight = [&](std::size_t i) { return std::max(batch.a[i] / job_.pressure.modulus(0), 0.0) + std::max(batch.b[i] / job_.pressure.modulus(1), 0.0); };
+  const auto across = [&](std::size_t i) { return Vec3((batch.slope_b[i] - batch.slope_a[i]).normalized()); };
+  const auto presses = [&](std::size_t i) {
+    constexpr double kOutside = -1e-9;  // pressures over moduli; on a body's own samples its own is nothing but rounding
+    return batch.a[i] > kOutside * job_.pressure.modulus(0) && batch.b[i] > kOutside * job_.pressure.modulus(1) && weight(i) > 0.0;
+  };
+  r_.start.clear();
+  r_.start_pressure.clear();
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    if (!presses(i)) continue;
+    const double w = weight(i);
+    normals.push_back(across(i));
+    normal += w * normals.back();
+    place += w * batch.point[i];
+    all += w;
+    depth = std::max(depth, std::max(batch.a[i], 0.0) / batch.slope_a[i].norm() + std::max(batch.b[i], 0.0) / batch.slope_b[i].norm());
+    r_.start.push_back(batch.point[i]);
+    const double fall_a = batch.slope_a[i].norm(), fall_b = batch.slope_b[i].norm();
+    r_.start_pressure.push_back((std::max(batch.a[i], 0.0) * fall_b + std::max(batch.b[i], 0.0) * fall_a) / (fall_a + fall_b));
+  }
+  if (!(all > 0.0)) return false;
+  place /= all;
+  const Vec3 axis = middle_of(normals, normal);
+  graph_ = least_cosine(normals, axis) > kLeastCosine;
+  const Vec3 first = job_.pressure.tangent(place, axis).value_or(axis.unitOrthogonal());
+  const Vec3 u = (first - first.dot(axis) * axis).normalized();
+  setting_.view.frame = {place, {u, axis.cross(u), axis}};
+  for (Vec3& x : r_.start) x = setting_.view.frame.local(x);
+  constexpr double kEnough = 0.03, kLeastDepth = 1e-9;
+  const double feature = 2.0 * setting_.view.reach;
+  setting_.enough = kEnough * std::sqrt(job_.error * std::clamp(depth, kLeastDepth * feature, feature) * feature);
+  return true;
+}
+
+Box PanelSolver::box_of(const Panel& panel) const {
+  const RayFrame& frame = setting_.view.frame;
+  Vec3 centre, half;
+  for (std::size_t k = 0; k < 3; ++k) {
+    centre[static_cast<Eigen::Index>(k)] = 0.5 * (panel.low[k] + panel.high[k]);
+    half[static_cast<Eigen::Index>(k)] = 0.5 * (panel.high[k] - panel.low[k]);
+  }
+  const Vec3 middle = frame.world(centre), reach = frame.axis[0].cwiseAbs() * half[0] + frame.axis[1].cwiseAbs() * half[1] + frame.axis[2].cwiseAbs() * half[2];
+  return {middle - reach, middle + reach};
+}
+
+/// The overlap in cells no wider than the bodies' features, or half of them where what lies between nodes may matter.
+void PanelSolver::start() {
+  const RayFrame& frame = setting_.view.frame;
+  std::array<double, 3> low, high, count;
+  low.fill(std::numeric_limits<double>::infinity());
+  high.fill(-std::numeric_limits<double>::infinity());
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 pick((corner & 1) != 0 ? 1.0 : 0.0, (corner & 2) != 0 ? 1.0 : 0.0, (corner & 4) != 0 ? 1.0 : 0.0);
+    const Vec3 y = frame.local(job_.overlap.lower + pick.cwiseProduct(job_.overlap.extent()));
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], y[static_cast<Eigen::Index>(k)]);
+      high[k] = std::max(high[k], y[static_cast<Eigen::Index>(k)]);
+    }
+  }
+  constexpr double kFewest = 2.0, kMost = 16.0;
+  constexpr double kCoarse = 1e-3;
+  const double size = job_.pressure.feature_size() * (graph_ && job_.error >= kCoarse ? 1.0 : 0.5);
+  for (std::size_t k = 0; k < 3; ++k) count[k] = k == 2 && graph_ ? 1.0 : std::clamp(std::ceil((high[k] - low[k]) / size), kFewest, kMost);
+  for (double i = 0.0; i < count[0]; ++i) {
+    for (double j = 0.0; j < count[1]; ++j) {
+      for (double l = 0.0; l < count[2]; ++l) {
+        std::array<double, 3> from{}, to{};
+        for (std::size_t k = 0; k < 3; ++k) {
+          const double width = (high[k] - low[k]) / count[k], at = k == 0 ? i : k == 1 ? j : l;
+          from[k] = low[k] + at * width;
+          to[k] = from[k] + width;
+        }
+        add_cell(from, to, !graph_, nullptr);
+      }
+    }
+  }
+}
+
+void PanelSolver::add_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, bool walls, const Panel* parent) {
+  Panel panel;
+  panel.low = low;
+  panel.high = high;
+  panel.walls = walls;
+  if (parent != nullptr) {
+    panel.along = parent->along;
+    panel.reverse = parent->reverse;
+    panel.cut = parent->cut;
+    panel.depth = static_cast<std::uint8_t>(parent->depth + 1);
+    panel.guess = parent->nodes;
+  }
+  if ((parent == nullptr || walls) && !job_.pressure.may_meet(box_of(panel))) return;
+  r_.panel.push_back(panel);
+}
+
+/// Rays of cells with walls run along the axis nearest to the normal in the middle.
+void PanelSolver::choose_axes(std::size_t first) {
+  PressureBatch& batch = r_.batch;
+  batch.resize(r_.panel.size() - first);
+  for (std::size_t i = first; i < r_.panel.size(); ++i) batch.point[i - first] = box_of(r_.panel[i]).centre();
+  job_.pressure.evaluate(batch);
+  for (std::size_t i = first; i < r_.panel.size(); ++i) {
+    Panel& panel = r_.panel[i];
+    const Vec3 normal = batch.slope_b[i - first] - batch.slope_a[i - first];
+    Vec3 part;
+    for (std::size_t k = 0; k < 3; ++k) part[static_cast<Eigen::Index>(k)] = normal.dot(setting_.view.frame.axis[k]);
+    Eigen::Index along = 0;
+    part.cwiseAbs().maxCoeff(&along);
+    panel.along = static_cast<std::uint8_t>(along);
+    panel.reverse = part[along] < 0.0;
+  }
+}
+
+bool PanelSolver::crosses(const implicit::Kink& kink, const Panel& panel) const {
+  // A kink in a third derivative bends the pressure so little that halving is cheaper down to here.
+  constexpr double kThirdDerivative = 1e-5;
+  if (kink.order > 2 && job_.error >= kThirdDerivative) return false;
+  // Around the nodes' feet, as far as the panel reaches across.
+  const double u = panel.high[static_cast<std::size_t>(first_across(panel.along))] - panel.low[static_cast<std::size_t>(first_across(panel.along))];
+  const double v = panel.high[static_cast<std::size_t>(second_across(panel.along))] - panel.low[static_cast<std::size_t>(second_across(panel.along))];
+  const double radius = 0.5 * std::hypot(u, v) / kLeastCosine;
+  const std::size_t middle = panel.nodes.begin + panel.nodes.size() / 2;
+  const SigmaRay& ray = r_.arena.node[middle];
+  const Vec3 x = setting_.view.frame.world(ray.local(ray.height));
+  return std::abs(kink.value(x)) <= kink.change(x, radius);
+}
+
+void PanelSolver::set_levels(Panel& panel) {
+  std::vector<std::uint16_t>& level = r_.arena.level;
+  panel.levels.begin = static_cast<std::uint32_t>(level.size());
+  level.push_back(Levels::kRim);
+  if (panel.walls) level.insert(level.end(), {Levels::kLowWall, Levels::kHighWall});
+  const Box box = job_.third.empty() ? Box{} : box_of(panel);
+  for (std::size_t t = 0; t < job_.third.size(); ++t) {
+    if (job_.third[t].body->field.bound(box).upper > 0.0) level.push_back(static_cast<std::uint16_t>(Levels::kFirstThird + t));
+  }
+  for (std::size_t k = 0; k < r_.kink.size() && panel.cut && panel.nodes.size() > 0; ++k) {
+    if (crosses(r_.kink[k], panel)) level.push_back(static_cast<std::uint16_t>(setting_.levels.first_kink() + k));
+  }
+  panel.levels.end = static_cast<std::uint32_t>(level.size());
+}
+
+/// Panels from the given one on, whose levels are set.
+void PanelSolver::measure(std::size_t first) {
+  r_.which.resize(r_.panel.size() - first);
+  std::iota(r_.which.begin(), r_.which.end(), static_cast<std::uint32_t>(first));
+  for (const std::uint32_t i : r_.which) set_levels(r_.panel[i]);
+  measure_panels(setting_, r_.panel, r_.which, r_.arena);
+  for (const std::uint32_t i : r_.which) {
+    Panel& panel = r_.panel[i];
+    if (panel.points.size() == 0) look_for_starts(panel);
+    if (!panel.steep) continue;
+    panel.off = panel.sums;
+    panel.missed_load = std::max(panel.missed_load, panel.sums.load);
+  }
+}
+
+/// A panel without points that holds a place where the bodies press misses something, unless a third body may have it.
+void PanelSolver::look_for_starts(Panel& panel) const {
+  for (std::uint32_t l = panel.levels.begin; l < panel.levels.end; ++l) {
+    if (setting_.levels.is_third(r_.arena.level[l])) return;
+  }
+  double most = 0.0;
+  for (std::size_t i = 0; i < r_.start.size(); ++i) {
+    bool within = true;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double at = r_.start[i][static_cast<Eigen::Index>(k)];
+      within = within && ((k == panel.along && !panel.walls) || (at >= panel.low[k] && at <= panel.high[k]));
+    }
+    if (within) most = std::max(most, r_.start_pressure[i]);
+  }
+  if (!(most > 0.0)) return;
+  const double across = panel.high[static_cast<std::size_t>(first_across(panel.along))] - panel.low[static_cast<std::size_t>(first_across(panel.along))];
+  const double along = panel.high[static_cast<std::size_t>(second_across(panel.along))] - panel.low[static_cast<std::size_t>(second_across(panel.along))];
+  const double area = across * along / (setting_.order * setting_.order);  // what a node stands for
+  panel.missed_area = std::max(panel.missed_area, area);
+  panel.missed_load = std::max(panel.missed_load, most * area / 3.0);
+}
+
+double PanelSolver::error_of(const Panel& panel) const {
+  if (!(all_.load > 0.0) || !(all_.area > 0.0)) return panel.missed_load > 0.0 ? 1.0 : 0.0;
+  const Vec3 first = panel.off.first - panel.off.load * all_.centre();
+  return std::max({(panel.off.force.norm() + panel.missed_load) / force_scale(all_.force, all_.load), (std::abs(panel.off.area) + panel.missed_area) / all_.area,
+                   first.norm() / (all_.load * std::sqrt(all_.area))});
+}
+
+/// What two orders differ by over all panels, and what is left where their differences cancel by chance: the root of the sum of squares.
+double PanelSolver::estimate() {
+  all_ = {};
+  for (const Panel& panel : r_.panel) all_.add(panel.sums);
+  if (!(all_.load > 0.0) || !(all_.area > 0.0)) return 1.0;
+  Errors e;
+  const Vec3 centre = all_.centre();
+  for (const Panel& panel : r_.panel) {
+    const Vec3 first = panel.off.first - panel.off.load * centre;
+    e.force += panel.off.force;
+    e.first += first;
+    e.area += panel.off.area;
+    e.force_square += panel.off.force.squaredNorm();
+    e.first_square += first.squaredNorm();
+    e.area_square += panel.off.area * panel.off.area;
+    e.missed_load += panel.missed_load;
+    e.missed_area += panel.missed_area;
+  }
+  const double force = (e.force.norm() + std::sqrt(e.force_square) + e.missed_load) / force_scale(all_.force, all_.load);
+  const double area = (std::abs(e.area) + std::sqrt(e.area_square) + e.missed_area) / all_.area;
+  const double first = (e.first.norm() + std::sqrt(e.first_square)) / (all_.load * std::sqrt(all_.area));
+  return kSafety * std::max({force, area, first});
+}
+
+/// Moves the panels that err most to `chosen`; what the others err by is a share of what is asked. @return whether there are such
+bool PanelSolver::choose() {
+  constexpr double kShare = 0.5;
+  std::vector<std::uint32_t>& order = r_.order;
+  order.clear();
+  r_.value.resize(r_.panel.size());
+  for (std::size_t i = 0; i < r_.panel.size(); ++i) {
+    r_.value[i] = error_of(r_.panel[i]);
+    if (r_.value[i] > 0.0 && r_.panel[i].depth < kMostDepth) order.push_back(static_cast<std::uint32_t>(i));
+  }
+  std::sort(order.begin(), order.end(), [&](std::uint32_t p, std::uint32_t q) { return r_.value[p] != r_.value[q] ? r_.value[p] < r_.value[q] : p < q; });
+  double square = 0.0, sum = 0.0;
+  std::size_t kept = 0;
+  for (; kept < order.size(); ++kept) {
+    const double e = r_.value[order[kept]];
+    square += e * e;
+    sum += e;
+    // Errors of one sign add up, others cancel: between the two.
+    if (std::sqrt(std::sqrt(square) * sum) > kShare / kSafety * job_.error) break;
+  }
+  if (kept == order.size()) {
+    if (order.empty()) return false;
+    --kept;
+  }
+  order.erase(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(kept));
+  std::sort(order.begin(), order.end());
+  r_.chosen.clear();
+  for (const std::uint32_t i : order) r_.chosen.push_back(r_.panel[i]);
+  for (std::size_t n = order.size(); n-- > 0;) r_.panel.erase(r_.panel.begin() + order[n]);
+  return true;
+}
+
+/// Whether kinks that a panel is not cut at yet cross it.
+bool PanelSolver::try_to_cut(Panel& panel) {
+  if (panel.cut) return false;
+  if (!kinks_known_) {
+    kinks_known_ = true;
+    (void)job_.pressure.kinks(job_.overlap, r_.kink);
+    setting_.levels.kink = r_.kink;
+  }
+  panel.cut = true;
+  return std::any_of(r_.kink.begin(), r_.kink.end(), [&](const implicit::Kink& kink) { return crosses(kink, panel); });
+}
+
+void PanelSolver::split(const Panel& panel, std::size_t axis, double place, bool walls) {
+  for (const bool upper : {false, true}) {
+    std::array<double, 3> low = panel.low, high = panel.high;
+    (upper ? low : high)[axis] = place;
+    add_cell(low, high, walls, &panel);
+  }
+}
+
+void PanelSolver::refine() {
+  const std::size_t first = r_.panel.size();
+  std::size_t steep = 0;
+  for (std::size_t i = 0; i < r_.chosen.size(); ++i) {
+    const Panel& panel = r_.chosen[i];
+    if (!panel.steep) continue;
+    std::size_t longest = 0;
+    for (const std::size_t k : {1u, 2u}) longest = panel.high[k] - panel.low[k] > panel.high[longest] - panel.low[longest] ? k : longest;
+    split(panel, longest, 0.5 * (panel.low[longest] + panel.high[longest]), true);
+    ++steep;
+  }
+  if (steep > 0) choose_axes(first);
+  for (Panel& panel : r_.chosen) {
+    if (panel.steep) continue;
+    if (try_to_cut(panel)) {
+      panel.guess = panel.nodes;
+      r_.panel.push_back(panel);
+      continue;
+    }
+    split(panel, static_cast<std::size_t>(panel.parting == 0 ? first_across(panel.along) : second_across(panel.along)), panel.parting_place, panel.walls);
+  }
+  measure(first);
+}
+
+void PanelSolver::hand_over(PatchPoints& points, PanelOutcome& out) {
+  out.sums = all_;
+  for (const Panel& panel : r_.panel) {
+    out.thirds = out.thirds || panel.thirds;
+    for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
+      const PanelPoint& p = r_.arena.point[i];
+      points.point.push_back(p.at);
+      points.normal.push_back(p.normal);
+      points.area.push_back(p.area);
+      points.pressure.push_back(p.pressure);
+      points.residual = std::max(points.residual, p.mismatch);
+      if (p.pressure <= out.largest) continue;
+      out.largest = p.pressure;
+      out.thickness = p.fall[0] > 0.0 && p.fall[1] > 0.0 ? p.pressure / p.fall[0] + p.pressure / p.fall[1] : 0.0;
+    }
+  }
+}
+
+/// Whether both bodies reach as far beyond Sigma as the other one's pressure, to first order: where one is thinner, it may have another sheet of Sigma on
+/// its far side.
+bool PanelSolver::has_one_sheet() {
+  constexpr double kOfLargest = 0.05;  // near the rim both end where Sigma does
+  const Vec3& axis = setting_.view.frame.axis[2];
+  double largest = 0.0;
+  for (const Panel& panel : r_.panel) {
+    for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) largest = std::max(largest, r_.arena.point[i].pressure);
+  }
+  for (const int side : {0, 1}) {
+    r_.far.clear();
+    for (const Panel& panel : r_.panel) {
+      for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
+        const PanelPoint& p = r_.arena.point[i];
+        const double fall = p.fall[static_cast<std::size_t>(side)];
+        if (p.pressure < kOfLargest * largest) continue;
+        if (!(fall > 0.0)) return false;
+        r_.far.push_back(p.at + (side == 0 ? 1.0 : -1.0) * p.pressure / fall * axis);
+      }
+    }
+    r_.value.resize(r_.far.size());
+    job_.pressure.evaluate(1 - side, r_.far, r_.value);
+    if (std::any_of(r_.value.begin(), r_.value.end(), [](double p) { return p <= 0.0; })) return false;
+  }
+  return true;
+}
+
+bool PanelSolver::solve(PatchPoints& points, PanelOutcome& out) {
+  r_.arena.clear();
+  r_.panel.clear();
+  r_.kink.clear();
+  if (!find_frame() || (job_.graph_only && !graph_)) return false;
+  start();
+  if (!graph_) choose_axes(0);
+  measure(0);
+  for (out.estimate = estimate(); out.estimate > job_.error && r_.panel.size() < kMostPanels && choose(); out.estimate = estimate()) refine();
+  if (!(all_.load > 0.0) || (job_.graph_only && !has_one_sheet())) return false;
+  hand_over(points, out);
+  const int along = setting_.order - (job_.energy ? 1 : 2);
+  add_columns({job_.pressure, setting_.view.frame.axis[2], along, setting_.enough, setting_.view.reach, job_.regions}, r_.panel, r_.arena.point, points);
+  return true;
+}
+
+}  // namespace
+
+bool solve_by_panels(const PanelJob& job, PanelRoom& room, PatchPoints& points, PanelOutcome& out) {
+  return PanelSolver(job, room).solve(points, out);
+}
+
+}  // namespace supple::collision

@@ -1,0 +1,64 @@
+/// @file panel_rule.h
+/// The contact surface of a pair by panels: few at first, more where the error is largest.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "surface/find_peak.h"
+#include "surface/panels/panels.h"
+
+namespace supple::collision {
+
+struct PanelJob {
+  PairPressure& pressure;
+  std::span<const ThirdLevel> third;  ///< that reach the overlap
+  const Box& overlap;                 ///< finite
+  std::span<const Vec3> starts;       ///< places near Sigma; each of its patches should have one
+  double error;                       ///< as in ContactSettings::error
+  Regions regions;
+  Vec3 reference;                     ///< that sums are about
+  bool energy;                        ///< wanted as good as the forces; else regions need only share these out
+  bool graph_only;                    ///< fits only where Sigma seems to be one graph over a plane
+};
+
+struct PanelOutcome {
+  PatchSums sums;
+  double estimate = 1.0;
+  double largest = 0.0;    ///< pressure [Pa]
+  double thickness = 0.0;  ///< of the overlap there, to first order [m]
+  bool thirds = false;     ///< whether third bodies press as hard somewhere
+};
+
+/// Room of `solve_by_panels`, empty between calls but for its capacity.
+struct PanelRoom {
+  PanelArena arena;
+  std::vector<Panel> panel, chosen;
+  std::vector<std::uint32_t> which, order;
+  std::vector<implicit::Kink> kink;
+  std::vector<Vec3> start, normal;     // places that press, in the frame of the rays; normals there
+  std::vector<double> start_pressure;  // about that of Sigma near these [Pa]
+  std::vector<Vec3> far;
+  PressureBatch batch;
+  std::vector<double> value;
+};
+
+/// @param points  receives those of Sigma, and of the squeezed regions that `regions` asks for
+/// @return false where there is no place to start from, Sigma is nowhere positive, or it does not fit
+bool solve_by_panels(const PanelJob& job, PanelRoom& room, PatchPoints& points, PanelOutcome& out);
+
+/// Lines from points of Sigma through the squeezed regions.
+struct ColumnJob {
+  PairPressure& pressure;
+  Vec3 way;            ///< of the columns, out of A into B [unit]
+  int order;           ///< Gauss points of a column
+  double enough;       ///< of a step to a column's end [m]
+  double reach;        ///< longest step that is believed [m]
+  Regions regions;
+};
+
+/// The integral of p_A over V_A, of a body that every line along the way leaves once, is the flux through Sigma of way times the integral of p_A from
+/// there to where A ends, as the divergence of that is -p_A (Gauss); so is that of B along the opposite way.
+void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<const PanelPoint> sigma, PatchPoints& points);
+
+}  // namespace supple::collision

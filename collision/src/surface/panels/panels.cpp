@@ -1,0 +1,635 @@
+#include "surface/panels/panels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "surface/quadrature.h"
+
+namespace supple::collision {
+namespace {
+
+/// Least cosine between Sigma's normal and the rays that see it.
+constexpr double kLeastCosine = 0.3;
+
+using Plane = std::array<double, 2>;
+
+std::size_t across(const Panel& panel, std::size_t k) { return static_cast<std::size_t>(k == 0 ? first_across(panel.along) : second_across(panel.along)); }
+double low_of(const Panel& panel, std::size_t k) { return panel.low[across(panel, k)]; }
+double width_of(const Panel& panel, std::size_t k) { return panel.high[across(panel, k)] - low_of(panel, k); }
+
+void part(Panel& panel, std::size_t coordinate, double place) {
+  panel.parting = static_cast<std::uint8_t>(coordinate);
+  panel.parting_place = place;
+}
+void part(Panel& panel, std::size_t coordinate) { part(panel, coordinate, low_of(panel, coordinate) + 0.5 * width_of(panel, coordinate)); }
+
+/// Polynomials of the two highest degrees above 1 that n Gauss points tell apart, the second one zero where there is but one: times the weights, orthonormal
+/// on (0, 1). Two, as functions may be even or odd.
+using HighestPolynomials = std::array<std::vector<double>, 2>;
+
+HighestPolynomials make_highest(int n) {
+  const GaussRule& rule = gauss_rule(n);
+  HighestPolynomials highest;
+  for (std::size_t i = 0; i < rule.node.size(); ++i) {
+    const double x = 2.0 * rule.node[i] - 1.0;
+    double p = 1.0, before = 0.0;
+    for (int degree = 1; degree < n; ++degree) {
+      const double next = ((2.0 * degree - 1.0) * x * p - (degree - 1.0) * before) / degree;
+      before = p;
+      p = next;
+    }
+    highest[0].push_back(std::sqrt(2.0 * n - 1.0) * p * rule.weight[i]);
+    highest[1].push_back(n > 3 ? std::sqrt(2.0 * n - 3.0) * before * rule.weight[i] : 0.0);
+  }
+  return highest;
+}
+
+const HighestPolynomials& highest_polynomials(int n) {
+  constexpr int kMost = 16;
+  static const std::vector<HighestPolynomials> all = [] {
+    std::vector<HighestPolynomials> rules(1);
+    for (int k = 1; k <= kMost; ++k) rules.push_back(make_highest(k));
+    return rules;
+  }();
+  return all[static_cast<std::size_t>(n)];
+}
+
+/// One pass over panels with a rule of one order.
+class Pass {
+ public:
+  Pass(PanelSetting& setting, std::span<Panel> panels, std::span<const std::uint32_t> which, int order, PanelArena& arena)
+      : s_(setting), panels_(panels), which_(which), order_(order), n_(static_cast<std::size_t>(order)), gauss_(gauss_rule(order)), a_(arena) {}
+
+  void place_lattice();
+  void look_at_lattice();
+  void bracket_between_walls();
+  void make_lines();
+  void find_least();
+  void predict();
+  void search();
+  void make_pieces();
+  /// @param first  of the two orders: points are kept
+  void add_up(bool first);
+
+ private:
+  [[nodiscard]] Plane lattice_place(const Panel& panel, std::size_t i, std::size_t j) const {
+    return {low_of(panel, 0) + gauss_.node[i] * width_of(panel, 0), low_of(panel, 1) + gauss_.node[j] * width_of(panel, 1)};
+  }
+  /// The rays of the panel that a line belongs to.
+  [[nodiscard]] std::span<const SigmaRay> lattice_of(std::uint32_t line) const { return std::span<const SigmaRay>(a_.ray).subspan((line / n_) * n_ * n_, n_ * n_); }
+  [[nodiscard]] SigmaRay start_ray(const Panel& panel, const Plane& at, std::span<const SigmaRay> near) const;
+  /// A ray of the lattice as far as it tells what is beside it.
+  struct Node {
+    Plane at;
+    double pressure;  // or what else bounds the patch more
+    Plane slope;
+    bool found;
+  };
+  [[nodiscard]] Node node(std::size_t k, std::size_t i) const {
+    const SigmaRay& ray = a_.ray[k * n_ * n_ + i];
+    const LevelValue& least = a_.least[k * n_ * n_ + i];
+    return {ray.at, least.value, least.slope, ray.found};
+  }
+  void look_beyond(Panel& panel, std::size_t k, bool upper, double& most) const;
+  void look_aside(Panel& panel, std::size_t k, std::size_t in, bool upper, double& most) const;
+  void look_between(Panel& panel, std::size_t k, double most) const;
+  void predict_line(std::uint32_t line, std::uint16_t level, std::size_t row, std::size_t stride);
+  void step_searches();
+  bool judge(PanelArena::Search& search, const LevelValue& value, const SigmaRay& ray);
+  void cut_line(std::uint32_t line);
+  void add_piece(std::uint32_t line, double begin, double end);
+  void judge_panel(std::size_t k, const Plane& rough);
+  double add_points(const PanelArena::Piece& piece, Panel& panel, PatchSums& sums, bool first);
+
+  PanelSetting& s_;
+  std::span<Panel> panels_;
+  std::span<const std::uint32_t> which_;
+  int order_;
+  std::size_t n_;
+  const GaussRule& gauss_;
+  PanelArena& a_;
+};
+
+/// From the nearest ray that is known.
+SigmaRay Pass::start_ray(const Panel& panel, const Plane& at, std::span<const SigmaRay> near) const {
+  SigmaRay ray;
+  ray.at = at;
+  ray.along = panel.along;
+  ray.reverse = panel.reverse;
+  const double low = panel.low[panel.along], high = panel.high[panel.along], margin = 0.5 * (high - low);
+  ray.low = low - margin;
+  ray.high = high + margin;
+  ray.height = 0.5 * (low + high);
+  double least = std::numeric_limits<double>::infinity();
+  for (const SigmaRay& other : near) {
+    if (!other.found || other.along != panel.along) continue;
+    const double du = at[0] - other.at[0], dv = at[1] - other.at[1], square = du * du + dv * dv;
+    if (square >= least) continue;
+    least = square;
+    ray.height = std::clamp(other.height + du * other.rise[0] + dv * other.rise[1], ray.low, ray.high);
+  }
+  return ray;
+}
+
+void Pass::place_lattice() {
+  a_.ray.clear();
+  for (const std::uint32_t p : which_) {
+    const Panel& panel = panels_[p];
+    const Slice near = panel.nodes.size() > 0 ? panel.nodes : panel.guess;
+    for (std::size_t j = 0; j < n_; ++j) {
+      for (std::size_t i = 0; i < n_; ++i) {
+        a_.ray.push_back(start_ray(panel, lattice_place(panel, i, j), std::span(a_.node).subspan(near.begin, near.size())));
+      }
+    }
+  }
+  bracket_between_walls();
+  lift(s_.view, a_.ray, s_.enough, a_.rays);
+}
+
+/// Whether Sigma is a graph, and how lines should run.
+void Pass::look_at_lattice() {
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    Panel& panel = panels_[which_[k]];
+    const std::span<const SigmaRay> rays = std::span(a_.ray).subspan(k * n_ * n_, n_ * n_);
+    Plane change{};
+    panel.steep = false;
+    for (const SigmaRay& ray : rays) {
+      if (!ray.found) continue;
+      const bool inside = !panel.walls || (ray.height > panel.low[panel.along] && ray.height < panel.high[panel.along]);
+      // A foot between walls that the signs at these do not tell has another one beside it.
+      const bool more = panel.walls && !ray.bracketed;
+      if (ray.pressure > 0.0 && inside) panel.steep = panel.steep || ray.cosine < kLeastCosine || more;
+      for (const std::size_t c : {0u, 1u}) change[c] += std::abs(ray.slope[c]) * width_of(panel, c);
+    }
+    panel.inner = change[0] >= change[1] ? 0 : 1;
+    part(panel, width_of(panel, 0) >= width_of(panel, 1) ? 0 : 1);
+    panel.nodes = {static_cast<std::uint32_t>(a_.node.size()), static_cast<std::uint32_t>(a_.node.size() + rays.size())};
+    a_.node.insert(a_.node.end(), rays.begin(), rays.end());
+  }
+}
+
+/// What may press beyond an outermost line that does not, by parabolas from its nodes to the side of the panel, and in its corners.
+void Pass::look_beyond(Panel& panel, std::size_t k, bool upper, double& most) const {
+  const std::size_t in = panel.inner, out = 1 - in, along = in == 0 ? 1 : n_, step = out == 0 ? 1 : n_;
+  const std::size_t first = upper ? (n_ - 1) * step : 0;
+  const auto near = [&](std::size_t i, bool other) { return node(k, first + i * along + (other ? (upper ? -step : step) : 0)); };
+  const double side = low_of(panel, out) + (upper ? width_of(panel, out) : 0.0);
+  const auto add = [&](double area, double load, double place) {
+    panel.missed_area += area;
+    panel.missed_load += load;
+    if (area <= most) return;
+    most = area;
+    part(panel, out, place);
+  };
+  for (std::size_t i = 0; i < n_; ++i) {
+    const Node ray = near(i, false), other = near(i, true);
+    if (!ray.found) continue;
+    const double way = side - ray.at[out], bend = other.found ? (other.slope[out] - ray.slope[out]) / (other.at[out] - ray.at[out]) : 0.0;
+    const double slope = ray.slope[out] + way * bend, pressure = ray.pressure + way * (ray.slope[out] + 0.5 * way * bend);
+    if (pressure > 0.0 && slope != 0.0) {
+      const double area = gauss_.weight[i] * width_of(panel, in) * std::min(pressure / std::abs(slope), std::abs(way));
+      add(area, 0.5 * pressure * area, ray.at[out]);
+    }
+    if (i != 0 && i + 1 != n_) continue;
+    const Node beside = near(i == 0 ? 1 : i - 1, false);
+    const double to_corner = low_of(panel, in) + (i == 0 ? 0.0 : width_of(panel, in)) - ray.at[in];
+    const double bend_in = beside.found ? (beside.slope[in] - ray.slope[in]) / (beside.at[in] - ray.at[in]) : 0.0;
+    const double twist = other.found ? (other.slope[in] - ray.slope[in]) / (other.at[out] - ray.at[out]) : 0.0;
+    const double in_corner = pressure + to_corner * (ray.slope[in] + way * twist + 0.5 * to_corner * bend_in);
+    if (!(in_corner > 0.0) || slope == 0.0 || ray.slope[in] == 0.0) continue;
+    const double area = 0.5 * std::min(in_corner / std::abs(slope), std::abs(way)) * std::min(in_corner / std::abs(ray.slope[in]), std::abs(to_corner));
+    add(area, in_corner * area / 3.0, ray.at[out]);
+  }
+}
+
+/// What may press along a side of the panel that is nowhere met by what its outermost nodes say of it: where cubics between these turn above zero.
+/// @param in  the coordinate that is fixed there
+void Pass::look_aside(Panel& panel, std::size_t k, std::size_t in, bool upper, double& most) const {
+  const std::size_t out = 1 - in, step = in == 0 ? 1 : n_, along = out == 0 ? 1 : n_;
+  const double side = low_of(panel, in) + (upper ? width_of(panel, in) : 0.0);
+  a_.sample.clear();
+  a_.root.clear();
+  double steepest = 0.0, fall = 0.0;
+  for (std::size_t j = 0; j < n_; ++j) {
+    const Node ray = node(k, j * along + (upper ? (n_ - 1) * step : 0));
+    const Node other = node(k, j * along + (upper ? (n_ - 2) * step : step));
+    if (!ray.found || !other.found) continue;
+    const double way = side - ray.at[in], gap = other.at[in] - ray.at[in];
+    const double slope = ray.slope[in] + way * (other.slope[in] - ray.slope[in]) / gap;
+    const double pressure = ray.pressure + 0.5 * way * (ray.slope[in] + slope);
+    a_.sample.push_back({ray.at[out], pressure, ray.slope[out] + way * (other.slope[out] - ray.slope[out]) / gap});
+    if (pressure > 0.0) return;  // looked at otherwise
+    steepest = std::max(steepest, std::abs(a_.sample.back().slope));
+    fall = std::max(fall, std::abs(slope));
+  }
+  if (a_.sample.size() < 2) return;
+  predict_roots(a_.sample, a_.sample.front().place, a_.sample.back().place, a_.root);
+  for (std::size_t i = 0; i + 1 < a_.root.size(); i += 2) {
+    // A cap as parabolas have it.
+    const double chord = a_.root[i + 1].guess - a_.root[i].guess, height = 0.25 * chord * steepest;
+    const double area = 2.0 / 3.0 * chord * std::min(height / fall, (1.0 - gauss_.node.back()) * width_of(panel, in));
+    panel.missed_area += area;
+    panel.missed_load += 0.4 * height * area;
+    if (area <= most) continue;
+    most = area;
+    part(panel, in, upper ? low_of(panel, in) + gauss_.node.back() * width_of(panel, in) : low_of(panel, in) + gauss_.node.front() * width_of(panel, in));
+  }
+}
+
+/// What may press between nodes that do not: where the pressure is concave along Sigma, it lies below all its tangents.
+void Pass::look_between(Panel& panel, std::size_t k, double most) const {
+  double below = std::numeric_limits<double>::infinity(), least = 0.0;
+  const Plane middle{low_of(panel, 0) + 0.5 * width_of(panel, 0), low_of(panel, 1) + 0.5 * width_of(panel, 1)};
+  for (std::size_t i = 0; i < n_ * n_; ++i) {
+    const Node ray = node(k, i);
+    below = std::min(below, ray.pressure + ray.slope[0] * (middle[0] - ray.at[0]) + ray.slope[1] * (middle[1] - ray.at[1]));
+    least = std::min(least, ray.pressure);
+  }
+  if (!(below > 0.0)) return;
+  const double area = width_of(panel, 0) * width_of(panel, 1) * below / (below - least);
+  if (area > most) part(panel, width_of(panel, 0) >= width_of(panel, 1) ? 0 : 1);
+  panel.missed_area += area;
+  panel.missed_load += below * area / 3.0;
+}
+
+/// Rays of cells with walls: where p_A - p_B has different signs at these, the foot is sought between them.
+void Pass::bracket_between_walls() {
+  std::vector<std::uint32_t>& open = a_.open;
+  PressureBatch& batch = a_.rays.batch;
+  open.clear();
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    if (!panels_[which_[k]].walls) continue;
+    for (std::size_t i = 0; i < n_ * n_; ++i) open.push_back(static_cast<std::uint32_t>(k * n_ * n_ + i));
+  }
+  if (open.empty()) return;
+  batch.resize(2 * open.size());
+  const auto walls_of = [&](std::uint32_t i) {
+    const Panel& panel = panels_[which_[i / (n_ * n_)]];
+    return Plane{panel.low[panel.along], panel.high[panel.along]};
+  };
+  for (std::size_t n = 0; n < open.size(); ++n) {
+    const Plane walls = walls_of(open[n]);
+    for (const std::size_t side : {0u, 1u}) batch.point[2 * n + side] = s_.view.frame.world(a_.ray[open[n]].local(walls[side]));
+  }
+  s_.view.pressure.evaluate_values(batch);
+  for (std::size_t n = 0; n < open.size(); ++n) {
+    SigmaRay& ray = a_.ray[open[n]];
+    const double sense = ray.sense();
+    const bool above_low = sense * (batch.a[2 * n] - batch.b[2 * n]) > 0.0, below_high = sense * (batch.a[2 * n + 1] - batch.b[2 * n + 1]) < 0.0;
+    if (!above_low || !below_high) continue;
+    const Plane walls = walls_of(open[n]);
+    ray.low = walls[0];
+    ray.high = walls[1];
+    ray.low_seen = ray.high_seen = ray.bracketed = true;
+    ray.height = std::clamp(ray.height, walls[0], walls[1]);
+  }
+}
+
+void Pass::make_lines() {
+  a_.line.clear();
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    const Panel& panel = panels_[which_[k]];
+    const std::size_t in = panel.inner, out = 1 - in;
+    const auto base = static_cast<std::uint32_t>(k * n_ * n_);
+    for (std::size_t j = 0; j < n_; ++j) {
+      PanelArena::Line line{};
+      line.panel = which_[k];
+      line.base[out] = low_of(panel, out) + gauss_.node[j] * width_of(panel, out);
+      line.way[in] = 1.0;
+      line.begin = low_of(panel, in);
+      line.end = line.begin + width_of(panel, in);
+      line.weight = gauss_.weight[j] * width_of(panel, out);
+      line.first = base + static_cast<std::uint32_t>(in == 0 ? j * n_ : j);
+      line.stride = static_cast<std::uint32_t>(in == 0 ? 1 : n_);
+      a_.line.push_back(line);
+    }
+  }
+}
+
+/// @param row  of the level's value at the first ray of the lattice   @param stride  to that at the next
+void Pass::predict_line(std::uint32_t index, std::uint16_t level, std::size_t row, std::size_t stride) {
+  PanelArena::Line& line = a_.line[index];
+  const std::size_t lattice = (index / n_) * n_ * n_;
+  const Panel& panel = panels_[line.panel];
+  a_.sample.clear();
+  for (std::size_t i = 0; i < n_; ++i) {
+    const SigmaRay& ray = a_.ray[line.first + i * line.stride];
+    if (!ray.found && level != Levels::kRim) continue;  // there is nothing to be cut
+    const LevelValue& value = a_.value[row + (line.first + i * line.stride - lattice) * stride];
+    a_.sample.push_back({ray.at[panel.inner], value.value, value.slope[panel.inner]});
+  }
+  if (a_.sample.empty()) return;
+  a_.root.clear();
+  const bool positive = predict_roots(a_.sample, line.begin, line.end, a_.root);
+  const bool inside = a_.sample.front().value > 0.0;
+  for (const LevelRoot& root : a_.root) a_.search.push_back({index, level, root, root.guess, 0.0, inside, false});
+  if (a_.root.empty() && !positive && !s_.levels.is_kink(level)) line.dead = true;
+  if (s_.levels.is_third(level)) panels_[line.panel].thirds = panels_[line.panel].thirds || !positive || !a_.root.empty();
+}
+
+/// What bounds the patch most at the rays of the lattice. Walls count as the pressures of both bodies change on the way to them.
+void Pass::find_least() {
+  a_.least.assign(a_.ray.size(), {std::numeric_limits<double>::infinity(), {}});
+  for (std::size_t i = 0; i < a_.query.size(); ++i) {
+    const LevelQuery& query = a_.query[i];
+    if (s_.levels.is_kink(query.level)) continue;
+    const SigmaRay& ray = a_.ray[query.ray];
+    const bool wall = query.level == Levels::kLowWall || query.level == Levels::kHighWall;
+    const double scale = wall ? ray.fall[0] + ray.fall[1] : 1.0;
+    const LevelValue& value = a_.value[i];
+    if (scale * value.value < a_.least[query.ray].value) a_.least[query.ray] = {scale * value.value, {scale * value.slope[0], scale * value.slope[1]}};
+  }
+}
+
+/// Where levels change their sign along the lines, as the lattice tells.
+void Pass::predict() {
+  a_.query.clear();
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    const Panel& panel = panels_[which_[k]];
+    const double low = panel.low[panel.along], high = panel.high[panel.along];
+    for (std::size_t i = 0; i < n_ * n_; ++i) {
+      for (std::uint32_t l = panel.levels.begin; l < panel.levels.end; ++l) {
+        a_.query.push_back({static_cast<std::uint32_t>(k * n_ * n_ + i), a_.level[l], {low, high}});
+      }
+    }
+  }
+  a_.value.resize(a_.query.size());
+  evaluate_levels(s_.levels, s_.view, a_.ray, a_.query, a_.levels, a_.value);
+  a_.search.clear();
+  find_least();
+  std::size_t begin = 0;
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    const Panel& panel = panels_[which_[k]];
+    const std::size_t count = panel.levels.size();
+    for (std::size_t j = 0; j < n_; ++j) {
+      const auto index = static_cast<std::uint32_t>(k * n_ + j);
+      const PanelArena::Line& line = a_.line[index];
+      for (std::size_t l = 0; l < count && !line.dead; ++l) {
+        predict_line(index, a_.level[panel.levels.begin + l], begin + l, count);
+      }
+    }
+    begin += n_ * n_ * count;
+  }
+  std::erase_if(a_.search, [this](const PanelArena::Search& search) { return a_.line[search.line].dead; });
+}
+
+/// What an evaluation at the place of a search says. @return whether to go on
+bool Pass::judge(PanelArena::Search& search, const LevelValue& value, const SigmaRay& ray) {
+  const PanelArena::Line& line = a_.line[search.line];
+  LevelRoot& root = search.root;
+  const double enough = s_.enough_rim * (line.end - line.begin);
+  const bool near = std::abs(ray.step) <= s_.enough;
+  if (ray.found && std::abs(ray.step) > s_.view.reach) return true;  // the foot first
+  const bool beyond = (value.value > 0.0) == root.rises;
+  (beyond ? root.high : root.low) = search.place;
+  (beyond ? root.open_high : root.open_low) = false;
+  const std::size_t inner = panels_[line.panel].inner;
+  const double slope = value.slope[inner];
+  search.drift = slope != 0.0 ? -value.slope[1 - inner] / slope : 0.0;
+  double next = search.place - value.value / slope;
+  if (!(next > root.low && next < root.high)) {
+    const bool lower = slope != 0.0 && std::isfinite(next) ? next <= root.low : beyond;
+    next = lower ? (root.open_low ? root.low : 0.5 * (root.low + root.high)) : (root.open_high ? root.high : 0.5 * (root.low + root.high));
+  }
+  const double move = std::abs(next - search.place);
+  search.place = next;
+  if (root.high - root.low <= 1e-3 * enough) {
+    search.found = !root.open_low && !root.open_high;
+    return false;
+  }
+  search.found = near && move <= enough;
+  return !search.found;
+}
+
+/// Newton's method along lines and rays at once, within brackets.
+void Pass::search() {
+  constexpr int kMostSteps = 40;
+  a_.cut_ray.clear();
+  a_.open.clear();
+  for (std::size_t i = 0; i < a_.search.size(); ++i) {
+    const PanelArena::Search& search = a_.search[i];
+    const PanelArena::Line& line = a_.line[search.line];
+    Plane at = line.base;
+    at[panels_[line.panel].inner] = search.place;
+    const Panel& panel = panels_[line.panel];
+    a_.cut_ray.push_back(start_ray(panel, at, lattice_of(search.line)));
+    a_.open.push_back(static_cast<std::uint32_t>(i));
+  }
+  for (int step = 0; step < kMostSteps && !a_.open.empty(); ++step) step_searches();
+  for (const std::uint32_t i : a_.open) a_.search[i].found = !a_.search[i].root.open_low && !a_.search[i].root.open_high;
+}
+
+void Pass::step_searches() {
+  probe(s_.view, a_.cut_ray, a_.open, a_.rays);
+  a_.query.clear();
+  for (const std::uint32_t i : a_.open) {
+    SigmaRay& ray = a_.cut_ray[i];
+    ray.found = std::isfinite(ray.step);
+    if (ray.found) ray.height += std::clamp(ray.step, -s_.view.reach, s_.view.reach);
+    const Panel& panel = panels_[a_.line[a_.search[i].line].panel];
+    a_.query.push_back({i, a_.search[i].level, {panel.low[panel.along], panel.high[panel.along]}});
+  }
+  a_.value.resize(a_.query.size());
+  evaluate_levels(s_.levels, s_.view, a_.cut_ray, a_.query, a_.levels, a_.value);
+  std::size_t kept = 0;
+  for (std::size_t n = 0; n < a_.open.size(); ++n) {
+    const std::uint32_t i = a_.open[n];
+    PanelArena::Search& search = a_.search[i];
+    if (!judge(search, a_.value[n], a_.cut_ray[i])) continue;
+    SigmaRay& ray = a_.cut_ray[i];
+    const std::size_t inner = panels_[a_.line[search.line].panel].inner;
+    const double move = search.place - ray.at[inner];
+    ray.at[inner] = search.place;
+    if (ray.found) ray.height += move * ray.rise[inner];
+    a_.open[kept++] = i;
+  }
+  a_.open.resize(kept);
+}
+
+void Pass::add_piece(std::uint32_t index, double begin, double end) {
+  const PanelArena::Line& line = a_.line[index];
+  const Panel& panel = panels_[line.panel];
+  constexpr double kNothing = 1e-12;
+  if (!(end - begin > kNothing * (line.end - line.begin))) return;
+  a_.piece.push_back({index, static_cast<std::uint32_t>(a_.cut_ray.size()), 1, begin, end, false});
+  const std::span<const SigmaRay> near = lattice_of(index);
+  for (std::size_t i = 0; i < n_; ++i) {
+    Plane at = line.base;
+    at[panel.inner] = begin + gauss_.node[i] * (end - begin);
+    a_.cut_ray.push_back(start_ray(panel, at, near));
+  }
+}
+
+/// The pieces of a line between its roots on which no level is negative.
+void Pass::cut_line(std::uint32_t index) {
+  PanelArena::Line& line = a_.line[index];
+  const Panel& panel = panels_[line.panel];
+  const auto event_of = [this](const auto& event) -> const PanelArena::Search& { return a_.search[event.second]; };
+  // Levels that are negative where the line begins: those whose first root rises.
+  std::size_t negative = 0;
+  for (std::uint32_t l = panel.levels.begin; l < panel.levels.end; ++l) {
+    const std::uint16_t level = a_.level[l];
+    if (s_.levels.is_kink(level)) continue;
+    const auto first = std::find_if(a_.event.begin(), a_.event.end(), [&](const auto& event) { return event_of(event).level == level; });
+    if (first != a_.event.end()) negative += event_of(*first).root.rises ? 1 : 0;
+  }
+  double begin = line.begin;
+  if (negative == 0) a_.end.push_back({LineEnd::kSide, line.begin, 0.0});
+  for (const auto& event : a_.event) {
+    const PanelArena::Search& search = event_of(event);
+    const double end = std::clamp(event.first, begin, line.end);
+    if (negative == 0) add_piece(index, begin, end);
+    begin = end;
+    if (s_.levels.is_kink(search.level)) continue;
+    const bool inside = negative == 0;
+    if (!search.root.rises) ++negative;
+    if (search.root.rises && negative > 0) --negative;
+    if (inside != (negative == 0)) a_.end.push_back({search.level, end, search.drift});
+  }
+  if (negative > 0) return;
+  add_piece(index, begin, line.end);
+  a_.end.push_back({LineEnd::kSide, line.end, 0.0});
+}
+
+void Pass::make_pieces() {
+  a_.piece.clear();
+  a_.cut_ray.clear();
+  a_.end.clear();
+  auto next = a_.search.begin();
+  for (std::uint32_t i = 0; i < a_.line.size(); ++i) {
+    PanelArena::Line& line = a_.line[i];
+    line.ends.begin = line.ends.end = static_cast<std::uint32_t>(a_.end.size());
+    a_.event.clear();
+    bool dead = line.dead;
+    while (next != a_.search.end() && next->line == i) {
+      const auto begin = next;
+      bool any = false;
+      for (; next != a_.search.end() && next->line == i && next->level == begin->level; ++next) {
+        if (next->found) a_.event.emplace_back(next->place, static_cast<std::uint32_t>(next - a_.search.begin()));
+        any = any || next->found;
+      }
+      // Roots that there are not: all along the line it is what it is inside.
+      dead = dead || (!any && !begin->inside && !s_.levels.is_kink(begin->level));
+    }
+    if (dead) continue;
+    if (a_.event.empty()) {
+      if (!a_.ray[line.first].found) continue;
+      a_.piece.push_back({i, line.first, line.stride, line.begin, line.end, true});
+      a_.end.insert(a_.end.end(), {{LineEnd::kSide, line.begin, 0.0}, {LineEnd::kSide, line.end, 0.0}});
+    } else {
+      std::sort(a_.event.begin(), a_.event.end());
+      cut_line(i);
+    }
+    line.ends.end = static_cast<std::uint32_t>(a_.end.size());
+  }
+  lift(s_.view, a_.cut_ray, s_.enough, a_.rays);
+}
+
+/// @return what the highest polynomials along the piece hold of the load
+double Pass::add_points(const PanelArena::Piece& piece, Panel& panel, PatchSums& sums, bool first) {
+  const PanelArena::Line& line = a_.line[piece.line];
+  const HighestPolynomials& highest = highest_polynomials(order_);
+  const std::vector<SigmaRay>& rays = piece.lattice ? a_.ray : a_.cut_ray;
+  const double length = piece.end - piece.begin;
+  Plane rough{};
+  for (std::size_t i = 0; i < n_; ++i) {
+    const SigmaRay& ray = rays[piece.first + i * piece.stride];
+    if (!ray.found || !(ray.cosine > 0.0)) continue;
+    if (ray.pressure > 0.0 && ray.cosine < kLeastCosine) panel.steep = true;
+    const double pressure = std::max(ray.pressure, 0.0), stretch = line.weight * length / ray.cosine, area = stretch * gauss_.weight[i];
+    const Vec3 at = s_.view.frame.world(ray.local(ray.height));
+    sums.add(at - s_.reference, ray.normal, area, pressure);
+    for (const std::size_t d : {0u, 1u}) rough[d] += stretch * highest[d][i] * pressure;
+    if (first) a_.point.push_back({at, ray.normal, area, pressure, ray.mismatch, ray.fall, ray.cosine});
+  }
+  return std::abs(rough[0]) + std::abs(rough[1]);
+}
+
+/// What the panel may hold that no line tells, and where it would be split: at the worst corner, else in the middle of what is roughest.
+/// @param rough  what the highest polynomials hold of the load, along lines and across them
+void Pass::judge_panel(std::size_t k, const Plane& rough) {
+  Panel& panel = panels_[which_[k]];
+  double most = 0.0;
+  panel.missed_load = panel.missed_area = 0.0;
+  for (const bool upper : {false, true}) {
+    look_aside(panel, k, panel.inner, upper, most);
+    if (!(upper ? a_.shape.back() : a_.shape.front()).ends.empty()) continue;
+    look_beyond(panel, k, upper, most);
+    look_aside(panel, k, 1 - panel.inner, upper, most);
+  }
+  if (panel.points.size() == 0) return look_between(panel, k, most);
+  const double beside = most;
+  if (!(beside > 0.0)) part(panel, rough[0] >= rough[1] ? panel.inner : 1 - panel.inner);
+  const std::size_t out = 1 - panel.inner;
+  const double low = low_of(panel, panel.inner), high = low + width_of(panel, panel.inner);
+  constexpr double kLeastShare = 1e-3;  // of the panel, beside a corner
+  for (std::size_t j = 0; j <= n_; ++j) {
+    const double side = low_of(panel, out) + (j == 0 ? 0.0 : width_of(panel, out));
+    const std::optional<PanelCorner> corner =
+        j == 0 || j == n_ ? corner_beyond(a_.shape[j == 0 ? 0 : j - 1], side, low, high) : corner_between(a_.shape[j - 1], a_.shape[j], low, high);
+    if (!corner) continue;
+    panel.missed_area += corner->area;
+    panel.missed_load += corner->load;
+    const double share = (corner->at - low_of(panel, out)) / width_of(panel, out);
+    if (corner->area <= most || share < kLeastShare || share > 1.0 - kLeastShare) continue;
+    most = corner->area;
+    part(panel, out, corner->at);
+  }
+}
+
+void Pass::add_up(bool first) {
+  const HighestPolynomials& highest = highest_polynomials(order_);
+  auto piece = a_.piece.begin();
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    Panel& panel = panels_[which_[k]];
+    PatchSums sums;
+    double along = 0.0;
+    Plane across{};
+    if (first) panel.points.begin = static_cast<std::uint32_t>(a_.point.size());
+    a_.shape.clear();
+    for (std::size_t j = 0; j < n_; ++j) {
+      const auto index = static_cast<std::uint32_t>(k * n_ + j);
+      const PanelArena::Line& line = a_.line[index];
+      PatchSums of_line;
+      for (; piece != a_.piece.end() && piece->line == index; ++piece) along += add_points(*piece, panel, of_line, first);
+      for (const std::size_t d : {0u, 1u}) across[d] += of_line.load / gauss_.weight[j] * highest[d][j];
+      sums.add(of_line);
+      a_.shape.push_back({line.base[1 - panel.inner], of_line.area / line.weight, of_line.load / line.weight, std::span<const LineEnd>(a_.end).subspan(line.ends.begin, line.ends.size())});
+    }
+    if (!first) {
+      panel.off.add(sums, -1.0);
+      continue;
+    }
+    panel.points.end = static_cast<std::uint32_t>(a_.point.size());
+    panel.sums = panel.off = sums;
+    judge_panel(k, {along, std::abs(across[0]) + std::abs(across[1])});
+  }
+}
+
+}  // namespace
+
+void measure_panels(PanelSetting& setting, std::span<Panel> panels, std::span<const std::uint32_t> which, PanelArena& arena) {
+  std::vector<std::uint32_t>& rest = arena.compared;
+  for (const int order : {setting.order, setting.order - 1}) {
+    const bool first = order == setting.order;
+    if (!first) {
+      // Where there is nothing, and nothing beside it, one look is enough.
+      rest.clear();
+      for (const std::uint32_t p : which) {
+        if (panels[p].points.size() > 0 || panels[p].missed_load > 0.0) rest.push_back(p);
+      }
+      which = rest;
+    }
+    Pass pass(setting, panels, which, order, arena);
+    pass.place_lattice();
+    if (first) pass.look_at_lattice();
+    pass.make_lines();
+    pass.predict();
+    pass.search();
+    pass.make_pieces();
+    pass.add_up(first);
+  }
+}
+
+}  // namespace supple::collision

@@ -1,0 +1,115 @@
+/// @file panels.h
+/// Quadrature on Sigma over panels: rectangles across parallel rays, cut along lines where level functions change their sign (nested reduction of
+/// dimensions: Saye 2015, SIAM J. Sci. Comput. 37, A993).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "surface/panels/level_roots.h"
+#include "surface/panels/panel_corners.h"
+#include "surface/panels/panel_levels.h"
+#include "surface/panels/sigma_rays.h"
+#include "surface/patch_points.h"
+
+namespace supple::collision {
+
+/// Points of a larger array.
+struct Slice {
+  std::uint32_t begin = 0, end = 0;
+  [[nodiscard]] std::size_t size() const { return end - begin; }
+};
+
+/// A box in the frame of the rays. Its panel is the rectangle across the axis along which Sigma is seen.
+struct Panel {
+  std::array<double, 3> low{}, high{};  // [m]
+  std::uint8_t along = 2;               // the axis of its rays
+  bool reverse = false;                 // which leads out of B into A
+  bool walls = false;                   // Sigma counts only between its heights; else it is all there is along the rays
+  bool cut = false;                     // lines are parted at kinks
+  std::uint8_t inner = 0;               // along which coordinate of the plane lines run
+  std::uint8_t depth = 0;
+  bool thirds = false;                  // a third body presses as hard somewhere
+  bool steep = false;                   // Sigma is no graph, or may be more than one sheet
+  Slice levels, guess, nodes, points;   // level numbers; rays to start from; its own; points of its sums
+  PatchSums sums, off;                  // by the order asked for; less those by the order below
+  double missed_load = 0.0, missed_area = 0.0;  // what it may hold beside its nodes
+  std::uint8_t parting = 0;             // the coordinate of the plane that it would be split at
+  double parting_place = 0.0;           // and where [m]
+};
+
+/// A place of Sigma with its area.
+struct PanelPoint {
+  Vec3 at, normal;
+  double area, pressure, mismatch;
+  std::array<double, 2> fall;  // of the pressures along the ray [Pa/m]
+  double cosine;
+};
+
+/// What all panels of a pair share.
+struct PanelSetting {
+  SigmaView view;
+  Levels levels;
+  int order = 3;          // Gauss points along a line, and lines
+  double enough = 0.0;    // of a step towards Sigma [m]
+  double enough_rim = 0.0;  // of a step along a line over its length
+  Vec3 reference = Vec3::Zero();
+};
+
+/// Buffers of one thread, empty between calls but for their capacity; slices of panels point here.
+struct PanelArena {
+  std::vector<SigmaRay> node;
+  std::vector<std::uint16_t> level;
+  std::vector<PanelPoint> point;
+
+  // Of one pass over panels.
+  struct Line {
+    std::uint32_t panel;
+    std::array<double, 2> base, way;  // a place at s: base + s way
+    double begin, end, weight;
+    std::uint32_t first, stride;      // of its rays
+    Slice ends;
+    bool dead;                        // a level is negative all along
+  };
+  struct Search {
+    std::uint32_t line;
+    std::uint16_t level;
+    LevelRoot root;
+    double place;
+    double drift;  // of the place, from line to line
+    bool inside;  // the level is positive at the first ray of the lattice
+    bool found;
+  };
+  struct Piece {
+    std::uint32_t line, first, stride;
+    double begin, end;
+    bool lattice;  // its rays are those of the lattice, else of `cut_ray`
+  };
+  std::vector<SigmaRay> ray, cut_ray;
+  std::vector<Line> line;
+  std::vector<Search> search;
+  std::vector<Piece> piece;
+  std::vector<LineEnd> end;
+  std::vector<LineShape> shape;
+  std::vector<LevelQuery> query;
+  std::vector<LevelValue> value, least;  // of queries; at each ray the level that bounds the patch most, as a pressure
+  std::vector<LevelSample> sample;
+  std::vector<LevelRoot> root;
+  std::vector<std::uint32_t> open, compared;
+  std::vector<std::pair<double, std::uint32_t>> event;
+  RayScratch rays;
+  LevelScratch levels;
+
+  void clear() {
+    node.clear();
+    level.clear();
+    point.clear();
+  }
+};
+
+/// Fills sums, errors and points of the panels `which`.
+void measure_panels(PanelSetting& setting, std::span<Panel> panels, std::span<const std::uint32_t> which, PanelArena& arena);
+
+}  // namespace supple::collision

@@ -1,0 +1,400 @@
+/// @file polar_rule.h
+/// Spectral quadrature on a smooth patch of Sigma: Gauss-Legendre in the radius times the trapezoid rule in the angle
+/// about the point of largest pressure, both exponentially convergent because the integrand is smooth, periodic and
+/// vanishes at the rim. Where mild kinks of a field cross the patch, the same rules about its middle converge with the fourth
+/// power of their points; where others do, radii are parted at them, and angles where kinks meet the rim and as finely as the
+/// error asks. Where faces lie on faces the pressure has no peak that says anything: there the patch is parted
+/// about its middle. Columns along the axis carry the integrals over the squeezed regions.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "supple/collision/contact_surface.h"
+#include "supple/implicit/kinks.h"
+#include "surface/find_peak.h"
+#include "surface/pair_pressure.h"
+#include "surface/patch_points.h"
+#include "surface/polar/apex.h"
+#include "surface/polar/imprint.h"
+#include "surface/polar/polar_cover.h"
+#include "surface/quadrature.h"
+
+namespace supple::collision {
+
+/// The finest rule whose error is judged from the ends of its rays.
+inline constexpr std::size_t kFinestJudged = 3;
+
+/// Errors asked for down to which mild kinks may be left alone; finer ones are reached by parting.
+inline constexpr double kLeastMild = 1e-6;
+/// Errors below which rays are parted at mild kinks, though angles are not.
+inline constexpr double kMildPartedBelow = 5e-5;
+
+/// Over the error asked for times the pressure at the peak: pressures of third bodies at the rim that say nothing, as rims are off by more.
+inline constexpr double kAtRim = 0.1;
+
+class PolarRuleSolver {
+ public:
+  /// Refines until two consecutive rules agree to `settings.error`, at most `settings.max_refinement` times.
+  /// @param regions  what is wanted of the squeezed regions
+  /// @param extent  rims farther away are not believed [m]
+  /// @param third  bodies that may press on the patch too: it counts where none of them presses harder, and is parted there
+  /// @param round  both pressures are the same all around the line through the frame's origin along its axis
+  /// @param follow  the rim all around, whether the peak sees it or not
+  /// @param faces  the bodies are convex: where kinks cross the patch, it is parted about its middle
+  /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
+  ///         regions reach beyond the rim. `points` is then not to be used.
+  [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+                           const Regions& regions, double extent, std::span<const ContactBody* const> third,
+                           bool round, bool follow, bool faces, PatchPoints& points);
+
+  [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about `origin()`
+  [[nodiscard]] const Vec3& origin() const noexcept { return frame_.origin; }
+  [[nodiscard]] double largest() const noexcept { return largest_; }  ///< pressure: at the peak, or of the nodes about the middle [Pa]
+  [[nodiscard]] double estimate() const noexcept { return estimate_; }
+  [[nodiscard]] std::uint32_t kinks() const noexcept { return parted_; }  ///< that the patch was parted at
+  [[nodiscard]] double thickness() const noexcept { return thickness_; }  ///< of the overlap there [m]
+  [[nodiscard]] double rounding() const;                                  ///< what round-off of the coordinates adds to the estimate
+  void cover(PolarCover& out) const;                                      ///< of the last solve
+
+ private:
+  /// Directions from the peak, and where the rim is met on them.
+  struct Rays {
+    std::vector<double> cosine, sine, radius, height;  // (cosine, sine): about the middle, of any length
+    std::vector<Vec2> outward;                         // the pressure falls, in units of u and v
+    [[nodiscard]] std::size_t size() const noexcept { return cosine.size(); }
+  };
+  bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+                        const Regions& regions, bool round, bool any, bool star, PatchPoints& points);
+  bool solve_rim(PairPressure& pressure, Rays& rays, double error, bool again);
+  [[nodiscard]] bool same_side(const Vec3& from, const Vec3& to) const;
+  [[nodiscard]] double rim_moved() const;
+  [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
+  void start_outline(const PolarRule& rule);
+  void place_nodes(const PolarRule& rule);
+  bool solve_heights(PairPressure& pressure, double error);
+  bool integrate();
+  void keep_along_axis(PatchSums& sums) const;
+  void turn(const PolarRule& rule, bool slopes);
+  bool finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns, PatchPoints& points);
+  // Columns through the squeezed regions: polar_columns.cpp.
+  /// Cosine of a body's normal to the columns at the rim: nearer to grazing, they are long beside it.
+  static constexpr double kUpright = 0.3;
+  bool widen_columns(int side, const Vec3& outward, const Vec3& across);
+  [[nodiscard]] bool lead_out(int side) const;
+  bool add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points);
+  void add_energy_from_ends(PairPressure& pressure, int nodes, int side, PatchPoints& points);
+  void add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points);
+  bool column_ends(PairPressure& pressure, int side, double tolerance, double inside);
+  bool end_within(PairPressure& pressure, int side);
+  bool goes_through(PairPressure& pressure, int side, bool ended);
+  bool comes_out(PairPressure& pressure, int side, Vec3 at);
+  void evaluate_on_lines(PairPressure& pressure, int side);
+  bool start_columns(int side);
+  bool start_out_of(const Apex& apex, double sign);
+  void start_rim(const PolarRule& rule, bool first);
+  [[nodiscard]] double placing_error() const;
+  [[nodiscard]] double algebraic_error() const;
+  // Bounds on smooth patches: smooth_bound.cpp.
+  [[nodiscard]] double unseen_by_angles(std::size_t r) const;
+  [[nodiscard]] double bound_by_ends(std::size_t r, bool round) const;
+  [[nodiscard]] bool clear_of_kinks(PairPressure& pressure);
+  [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
+
+  // Patches that mild kinks cross: mild_rule.cpp.
+  [[nodiscard]] bool only_mild_kinks() const;
+  bool solve_mild(PairPressure& pressure, double error);
+  bool refine_rings(PairPressure& pressure, double error);
+  bool solve_mild_sectors(PairPressure& pressure, const ContactSettings& settings);
+  [[nodiscard]] double half_the_rays(std::size_t radial) const;
+
+  // Patches that kinks cross: split_rule.cpp; crossings of rays: cross_kinks.cpp.
+  /// Gauss points through a squeezed region.
+  static int column_of(double error) { return error >= 1e-4 ? 3 : error >= 1e-6 ? 4 : error >= 1e-8 ? 5 : 6; }
+  struct Panel {
+    double begin = 0.0, end = 0.0;  // angles, or places along `sectors_`: i to i + 1 is sector i
+    std::size_t first = 0, last = 0;  // of `kept_`
+    std::size_t rim = 0, rim_end = 0;  // of `kept_rim_`
+    PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with other radii besides
+    std::array<PatchSums, 6> highest;  // as a polynomial of the angle, its coefficients of the highest degrees, falling
+    double by_angle = 0.0, by_radius = 0.0;  // what the finest sums may be off by, for either reason
+    double by_rim = 0.0;                     // its area, as the rim was left
+    int nodes = 0;                    // on a ray that no kink crosses
+    std::size_t rays = 0;             // of `fine`
+    std::size_t change = 0, change_end = 0;  // of `changes_`
+    std::size_t along = 0;            // its first ray of `along_`, where kinks are mild
+    bool extend = false;              // rays between its own are due
+    bool halved = false;              // or a part of one
+    bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
+    bool lost = false;                // a crossing that seemed to be there was not found
+    bool leaves = false;              // a kink meets the rim between two rays
+    [[nodiscard]] bool even() const { return change == change_end && !lost; }
+    [[nodiscard]] bool touches() const { return touch_begin || touch_end; }
+    /// Where node x in (-1, 1) is put between begin and end, and its rate. What a ray has of an imprint grows as the root of the
+    /// angle from where it touches it: as a polynomial, when the angle grows as a square.
+    [[nodiscard]] std::array<double, 2> bend(double x) const;
+  };
+  /// A kink as seen from the origin: of planes, spheres and cylinders s = value + slope . d + d . bend d, which others are asked for.
+  struct Sheet {
+    double value = 0.0;
+    Vec3 slope = Vec3::Zero();
+    Mat3 bend = Mat3::Zero();
+    bool flat = false, told = false;
+  };
+  /// Near where a ray touches a kink.
+  struct Touch {
+    std::size_t kink;
+    double angle, radius, height;  // radius in units of u and v
+    double from, to;               // angles that it lies between
+  };
+  /// Where within a panel rays begin to meet other kinks, or in another order.
+  struct Change {
+    double place = 0.0;
+    std::optional<Touch> touch;    // a kink that rays meet twice before it, or after it, and then not at all
+  };
+  /// What one ray adds to the sums of its panel, and its nodes.
+  struct RaySums {
+    PatchSums sums;
+    std::size_t first = 0, last = 0;  // of `kept_`
+  };
+  struct Corner {
+    Vec3 at;                       // on the rim
+    std::size_t kink;              // that meets it
+  };
+  struct Crossing {
+    std::size_t ray, kink;
+    double radius, height;  // radius over that of the rim
+    double left, right;     // it lies between these
+    bool good;
+  };
+  [[nodiscard]] Sheet sheet_of(const implicit::Kink& kink) const;
+  bool no_kinks_near(PairPressure& pressure);
+  void find_kinks(PairPressure& pressure);
+  bool kinks_cross(PairPressure& pressure);
+  [[nodiscard]] double at_rim() const { return kAtRim * error_ * frame_.peak; }
+  [[nodiscard]] bool taken_by_thirds();
+  bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);
+  void find_imprints(PairPressure& pressure);
+  void evaluate_thirds(std::span<const Vec3> points);
+  [[nodiscard]] double side_of(std::size_t kink, PairPressure& pressure, const Vec3& x);
+  [[nodiscard]] double side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const;
+  bool solve_split(PairPressure& pressure, const ContactSettings& settings);
+  void follow_rim();
+  [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
+  template <class Directions>
+  std::array<Directions, 2> sum_waves(const Directions& cosine, const Directions& sine) const;
+  void find_crossings(PairPressure& pressure, double error);
+  bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
+  void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
+  [[nodiscard]] std::optional<Touch> touch_between(std::span<const Crossing> before, std::span<const Crossing> here) const;
+  bool add_missed_kinks();
+  bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
+  bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
+  void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
+  bool extend_panels(PairPressure& pressure, double error);
+  void merge(Panel& panel, const Panel& added);
+  [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
+  static double slow_decay(const Panel& panel, const PatchSums& all);
+  void doubt(Panel& panel, const PatchSums& all, double error) const;
+  [[nodiscard]] bool grows_as_root(const Panel& panel) const;
+  [[nodiscard]] double largest_to_leave(double most) const;
+  [[nodiscard]] double model_height(std::size_t ray, double share) const;
+
+  // Corners of the rim: rim_corners.cpp.
+  struct RimPoint {
+    Vec2 at = Vec2::Zero();       // in units of u and v
+    double height = 0.0;
+    Vec2 outward = Vec2::Zero();  // the pressure falls
+  };
+  struct RimCorner {
+    RimPoint point;
+    bool strip_before = false, strip_after = false;  // there, as angles grow, the rim lies beyond an edge that it meets at the corner
+    double root_within = 0.0;                         // the strip's width grows as a root from this far across the rays on [m]
+  };
+  /// A kink where a ray meets it, on Sigma.
+  struct KinkOnRay {
+    std::size_t kink;
+    Vec2 way;                      // the ray's direction, of any length
+    double rim, height;            // rim near there, in units of `way`, as is `radius`
+    bool dip = false;               // the pressure along the kink comes near to 0 there
+    double radius = 0.0;
+    bool met = false;
+    bool positive = false;         // s at the rim, which lies beyond the kink where the pressure is above 0
+    double pressure = 0.0, rate = 0.0;  // over the angle
+  };
+  /// A corner is sought between the rays `left` and `right`: at left + place (right - left).
+  struct CornerSearch {
+    std::size_t kink;
+    Vec2 left, right;
+    double rim_left, rim_right;
+    bool positive_left;            // s at the rim on the left
+    bool beyond_left;              // the rim lies beyond the kink there
+    double place, height;
+    double from = 0.0, to = 1.0;
+    std::optional<Vec2> at = std::nullopt;
+  };
+  static void follow_signs(std::span<const double> values, std::vector<double>& places);
+  void move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last);
+  void find_corners(PairPressure& pressure, std::size_t least, std::vector<Corner>& corners);
+  [[nodiscard]] std::optional<double> corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray);
+  void meet_kinks(PairPressure& pressure, double close, std::span<KinkOnRay> rays);
+  void find_corners_between(PairPressure& pressure, std::span<CornerSearch> searches);
+  void add_vertices(std::vector<RimPoint>& rays) const;
+  void find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners);
+
+  // Rays that touch kinks: touch_kinks.cpp.
+  /// A kink along a ray on Sigma, and the ray's turning.
+  struct Along {
+    double s = 0.0, by_radius = 0.0, by_angle = 0.0;  // s at Sigma above a place near it, and its derivatives there
+    double height = 0.0, rise = 0.0, rise_across = 0.0;  // of Sigma there, and its derivatives
+  };
+  [[nodiscard]] Along along_ray(const PressureBatch& at, std::size_t i, std::size_t kink, double angle, double radius) const;
+  std::optional<double> touching_angle(PairPressure& pressure, const Touch& near);
+  void find_hidden_touches(PairPressure& pressure, std::span<const Corner> corners, std::vector<double>& angles);
+
+  // About the middle: middle_rule.cpp.
+  /// Directions of rays as a parabola through three points near the rim, with heights.
+  struct Sector {
+    std::array<Vec2, 3> at;
+    std::array<double, 3> height;
+    bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
+    bool strip_begin = false, strip_end = false;  // a strip beyond an edge begins there
+  };
+  /// The search for the rim along one ray: the last place inside, and one outside.
+  struct Walk {
+    Vec2 way = Vec2::Zero();
+    Vec3 along = Vec3::Zero();
+    double in = 0.0, in_height = 0.0, pressure = 0.0, slope = 0.0, bend = 0.0;  // pressure along Sigma, its first and second derivatives
+    double rise = 0.0;                   // of Sigma
+    double out = 0.0;
+    double most = 0.0;                   // length of a step that is believed
+    double passed = 0.0;                 // the last kink gone to
+    double at = 0.0, height = 0.0;       // where it looks next
+    bool fresh = true, done = false;     // without a second derivative; at the rim
+    Vec2 outward = Vec2::Zero();
+  };
+  bool solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
+                          const Regions& regions, PatchPoints& points);
+  bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings);
+  bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
+  bool follow_rays(PairPressure& pressure);
+  bool lift_to_sigma(PairPressure& pressure);
+  bool move_to_middle(PairPressure& pressure);
+  bool move_off_kinks(PairPressure& pressure);
+  void follow_tangents();
+  [[nodiscard]] bool make_sectors(std::span<const RimCorner> corners, double widest, double most_bend);
+  void start_sectors(int nodes, bool strips);
+  void cross_outline();
+  void place_rays(const KronrodRule& rule, std::size_t first);
+  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger, bool look);
+
+  // About a point that sees the whole rim: star_rule.cpp.
+  bool solve_about_star(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Regions& regions,
+                        bool fine, PatchPoints& points);
+  bool move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent, double step);
+  bool walk_to_rim(PairPressure& pressure, const Vec3& along, double step, Vec3& x);
+  bool follow_rim_curve(PairPressure& pressure, bool fine);
+  static std::optional<Vec2> point_that_sees(std::span<const Vec2> polygon);
+  bool move_to_star(PairPressure& pressure);
+  void bend_at_star(PairPressure& pressure, double rate);
+  void find_star_kinks(PairPressure& pressure);
+  void cross_star(PairPressure& pressure);
+  [[nodiscard]] std::array<double, 2> outline_at(double cosine, double sine) const;
+
+  /// A line from a node through a squeezed region. Where columns spread, X = node + t way, across from the axis by 1 + t spread times as far as the
+  /// node, and t has the area of the node's foot times (1 + t spread)(narrow + t spread).
+  struct Column {
+    Vec3 way;                       // of length 1 along the axis
+    std::array<double, 3> swept{};  // area across it over the distance along it, a polynomial; over that across the axis
+    [[nodiscard]] double width(double t) const { return swept[0] + t * (swept[1] + t * swept[2]); }
+    [[nodiscard]] double widens(double t) const { return swept[1] + 2.0 * t * swept[2]; }
+    [[nodiscard]] double volume(double t) const { return t * (swept[0] + t * (0.5 * swept[1] + t * swept[2] / 3.0)); }
+  };
+
+  PeakFrame frame_;
+  std::array<std::optional<Apex>, 2> apex_;  // of each side, where third bodies take their part
+  std::array<double, 2> spread_{};  // of the columns of each side, across over along [1/m], a metre from the axis
+  std::array<double, 2> widest_{};  // the same at the rim [1]
+  std::vector<Column> column_;  // by node, and that through the peak; one for all where they do not spread
+  [[nodiscard]] const Column& column(std::size_t i) const { return column_[column_.size() == 1 ? 0 : i]; }
+  Vec3 peak_ = Vec3::Zero();
+  double largest_ = 0.0;
+  std::size_t summit_ = 0;  // node where it is; their number: at the peak
+  double jacobian_ = 0.0;  // |u| |v|
+  double extent_ = 0.0;
+  Rays rim_;
+  std::vector<double> coarse_radius_, coarse_height_, start_radius_;
+  std::vector<double> low_, high_;
+  PressureBatch rim_batch_, crossing_batch_, node_;
+  PressureBatch some_;              // points of one of these at which Newton's method has not ended
+  std::vector<std::size_t> open_;   // which they are
+  std::vector<double> height_, weight_, area_, pressure_, end_[2], reached_;
+  std::vector<Vec3> foot_, normal_, line_point_, line_slope_;
+  std::vector<double> line_value_, other_value_;
+  double residual_ = 0.0;
+  double rim_error_ = 0.0;  // relative, of the area
+  // Of rays: the square of the last step of Newton's method to the rim [m^2], and what the last two say is left of the way, over the radius.
+  std::vector<double> moved_, rim_left_;
+  double lift_ = 0.0;       // largest distance of a node from Sigma
+  double below_ = 0.0;      // load of nodes that lie just beyond the rim, which is left out
+  double size_ = 0.0;       // of the bodies' features
+  PatchSums fine_, coarse_;
+  double estimate_ = 1.0;
+  double thickness_ = 0.0;
+  bool may_go_through_ = false;  // one body through the other: not balls and half-spaces, whose surfaces meet in one circle, and not where third bodies press
+
+  double error_ = 0.0;                 // asked for
+  std::span<const ContactBody* const> third_;
+  bool cut_ = false;                   // nodes where a third body presses harder do not count
+  std::vector<double> third_value_;    // pressures of third bodies at points, one body after the other
+  std::vector<Vec3> third_slope_;
+  std::vector<int> thirds_seen_;        // 1: pressing harder than the pair somewhere, 2: not so somewhere
+  ImprintFinder finder_;
+  std::vector<Imprint> imprints_;
+  PolarCover cover_;
+  std::uint32_t parted_ = 0;
+  std::vector<implicit::Kink> kinks_;
+  bool all_kinks_ = false;             // these are all of both fields
+  Box smooth_;                         // no kink is in it
+  std::vector<implicit::Kink> near_kinks_;
+  std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
+  std::vector<Panel> panels_;
+  std::vector<RaySums> along_;
+  struct Wave {
+    Eigen::ArrayXd cosine, sine;
+  };
+  std::array<Wave, 2> wave_;  // Fourier coefficients of the rim's radius and height
+  std::vector<Vec3> fine_rim_;
+  Rays rays_;
+  std::vector<double> linear_, square_, rest_;  // heights along a ray: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest)
+  std::vector<Crossing> crossings_;
+  std::vector<Change> changes_;
+  std::vector<double> turn_;             // what the weight of the angle is multiplied by
+  bool about_middle_ = false, about_star_ = false;
+  bool by_sectors_ = false;              // rays go through `sectors_`
+  bool mild_ = false;                    // kinks that cross part no angles
+  bool uneven_ = false;                  // mild kinks cross, but the outline takes more rings than it is worth
+  Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis; 0 elsewhere
+  std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
+  std::vector<Sector> sectors_;
+  std::vector<Walk> walks_;
+  std::vector<Sheet> sheets_;
+  std::vector<std::size_t> ray_nodes_, ray_check_;  // first node of a ray, and of those to compare with
+  /// Columns of kept nodes, each with that of the nodes at hand.
+  template <class Body>
+  void for_columns(const Body& body) {
+    body(kept_.point, node_.point);
+    body(kept_.slope_a, node_.slope_a);
+    body(kept_.slope_b, node_.slope_b);
+    body(kept_weight_, weight_);
+    body(kept_area_, area_);
+    body(kept_pressure_, pressure_);
+    body(kept_normal_, normal_);
+  }
+  PressureBatch kept_;
+  std::vector<double> kept_weight_, kept_area_, kept_pressure_;
+  std::vector<Vec3> kept_normal_;
+};
+
+}  // namespace supple::collision

@@ -1,0 +1,641 @@
+/// Polar quadrature of a patch that kinks of a field cross. Along a ray from the peak the pressures are smooth between
+/// kinks: Gauss-Legendre on each piece. The integral along a ray is smooth in the angle but where a kink meets the rim or another
+/// one, or touches the ray: Gauss-Kronrod on panels between the former, parted where rays begin to meet other kinks, or halved,
+/// while the two rules of a panel differ.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "supple/core/math.h"
+#include "surface/polar/polar_rule.h"
+
+namespace supple::collision {
+namespace {
+
+constexpr double kWidest = 2.2;          // panel at the beginning [rad]
+constexpr double kWidestCoarse = 2.4;
+constexpr int kMostRadial = 16;
+constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
+constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
+constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
+constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
+constexpr std::size_t kMostPanels = 48, kMostMild = 128, kMostBesideThirds = 192;  // that the estimate may ask for
+constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
+constexpr double kSameTurn = 1e-7;       // [rad]
+constexpr double kSliversBelow = 1e-6;   // errors at which those between a corner of the rim and the first ray after it matter
+constexpr double kLeastAlong = 0.5;      // cosine between the rim and the line to its next point
+constexpr double kLeastSight = 0.1;      // cosine between a ray and the normal of the rim: nearer to grazing, rays begin elsewhere
+constexpr double kMostChange = 2.0;      // of the radius, over what its slopes say
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+/// Points of the Gauss rule on a piece of a ray, of which there are `radial` on a whole one.
+int nodes_on(int radial, double share) {
+  const int least = share < kShort ? 2 : 3;
+  return std::clamp(static_cast<int>(std::ceil(radial * (0.35 + 0.65 * share))), least, kMostRadial);
+}
+
+/// The same between mild kinks, which are many and leave little on a piece.
+int nodes_between_mild(int radial, double share) {
+  return std::clamp(static_cast<int>(std::ceil(radial * (0.2 + 0.8 * share))), 2, kMostRadial);
+}
+
+/// Points that are compared with n: one more, so that what they differ by is what n are off by.
+int check_of(int n) { return n < kMostRadial ? n + 1 : n - 2; }
+
+/// The same on faces, where pieces have polynomials on them: fewer.
+int check_on_faces(int n) { return n > 4 ? n - 2 : n - 1; }
+
+/// Kinks so near to another, to the peak or to the rim are left out: the error is of the square; on a face, to whose edge the pressure is the same,
+/// of the length itself.
+double shortest_piece(double error, bool on_face) { return on_face ? 1e-3 * error : 3e-3 * std::sqrt(error); }
+
+void weigh(PatchSums& sums, const Vec3& x, const Vec3& normal, double weight, double pressure) {
+  if (weight != 0.0) sums.add(x, normal, weight, pressure);
+}
+
+/// Of force, area and first moment, over those of `all`.
+double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSums& all) {
+  const double force = (a.force - b.force).norm() / force_scale(all.force, all.load);
+  const double area = std::abs(a.area - b.area) / all.area;
+  const Vec3 first = (a.first - b.first) - (a.load - b.load) * all.centre();
+  return std::max({force, area, first.norm() / (all.load * std::sqrt(all.area))});
+}
+
+/// What the finer of two rules of angles is off by at most, as shares of their difference. Of panels all of whose rays meet the same kinks in the
+/// same order it converges faster than the coarser one, and the more so the less they differ, as in QUADPACK (Piessens et al. 1983,
+/// sec. 2.2.4.1); less so of panels that were halved because they did not. Where rays meet other kinks from some angle on, a derivative jumps
+/// there, and two rules say little; less so on faces, where the pressure is nearly the same on both sides. The shares come from the errors of
+/// 46,000 panels of a disc on a box, boxes, capsules, plates and blobs.
+constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
+constexpr double kRound = 6e5;  // times its square
+constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
+constexpr double kUnknown = 4.0;  // of either difference, where kinks are not all known
+constexpr double kRegularOnFaces = 2.0;  // times the root of the difference, of the panel itself
+constexpr double kDecayOnFaces = 2.0;    // of panels whose rays meet other kinks from some angle on
+constexpr double kOnFaces = 0.05, kOnFacesUneven = 0.1, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
+/// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
+constexpr double kRadial = 2.0, kRadialOnFacesFew = 0.15, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
+/// Of either, where mild kinks are left alone and rules converge with the fourth power of their points.
+constexpr double kMildAngle = 0.15, kMildByChance = 0.3, kMildRadius = 2.0;
+constexpr double kExtended = 100.0;  // over what it may be: a panel's doubt that twice as many rays are worth their while for; beyond it is halved
+constexpr std::size_t kFine = 15;  // rays
+constexpr int kFewOnFaces = 3;     // points on a ray, which are compared with two
+
+}  // namespace
+
+/// Rays of the panels from `first` on, as far as the rim. @return false where it is not found, or leads from a ray to what no ray sees
+bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
+  const std::size_t per_panel = rule.node.size();
+  const std::size_t count = (panels_.size() - first) * per_panel;
+  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &linear_, &square_, &rest_}) {
+    column->resize(count);
+  }
+  if (by_sectors_) {
+    place_rays(rule, first);
+  } else {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Panel& panel = panels_[first + i / per_panel];
+      const double node = rule.node[i % per_panel], half = 0.5 * (panel.end - panel.begin);
+      const auto [angle, rate] = panel.touches() ? panel.bend(node) : std::array{0.5 * (panel.begin + panel.end) + half * node, half};
+      turn_[i] = rate;
+      const auto [s, c] = math::sin_cos(angle);
+      rays_.cosine[i] = c;
+      rays_.sine[i] = s;
+      const auto [radius, height] = about_star_ ? outline_at(c, s) : rim_at(c, s);
+      rays_.radius[i] = radius;
+      rays_.height[i] = height;
+      if (!(radius > 0.0)) return false;
+    }
+  }
+  const double rim_error = rim_error_;
+  if (!solve_rim(pressure, rays_, error, false) && !(about_middle_ && follow_rays(pressure) && solve_rim(pressure, rays_, error, false))) return false;
+  rim_error_ = std::max(rim_error_, rim_error);
+  for (std::size_t p = first; p < panels_.size(); ++p) {
+    Panel& panel = panels_[p];
+    panel.rim = kept_rim_.size();
+    for (std::size_t i = (p - first) * per_panel; i < (p - first + 1) * per_panel; ++i) {
+      kept_rim_.push_back({rays_.radius[i] * Vec2(rays_.cosine[i], rays_.sine[i]), rays_.height[i], rays_.outward[i]});
+    }
+    panel.rim_end = kept_rim_.size();
+    if (!about_middle_ && !rim_joins(panel.rim, panel.rim_end, false)) return false;
+  }
+  return true;
+}
+
+/// Sums of the panels from `first` on, whose rays are known.
+bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
+  const std::size_t per_panel = rule.node.size(), count = rays_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double c = rays_.cosine[i], s = rays_.sine[i], rim = rays_.radius[i];
+    linear_[i] = rim * rise_.dot(direction(c, s));
+    // Faces are flat about the middle.
+    square_[i] = about_middle_ ? 0.0
+                               : 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
+    rest_[i] = rays_.height[i] - linear_[i] - square_[i];
+  }
+  find_crossings(pressure, error);
+  find_changes(pressure, rule, first);
+  const double shortest = shortest_piece(error, about_middle_);
+  std::erase_if(crossings_, [&](const Crossing& x) { return x.radius < shortest || x.radius > 1.0 - shortest; });
+
+  foot_.clear();
+  height_.clear();
+  weight_.clear();
+  ray_nodes_.clear();
+  ray_check_.clear();
+  std::vector<std::size_t> first_crossing(count + 1, 0);
+  for (const Crossing& x : crossings_) ++first_crossing[x.ray + 1];
+  std::partial_sum(first_crossing.begin(), first_crossing.end(), first_crossing.begin());
+  // That a piece's number of points goes by. Only every second ray is checked: those between have no fewer than either neighbour.
+  const auto share_of = [&](std::size_t ray, std::size_t piece, double width) {
+    const std::size_t k = ray % per_panel, pieces = first_crossing[ray + 1] - first_crossing[ray];
+    if (rule.gauss_weight[k] > 0.0) return width;
+    double most = width;
+    for (const std::size_t beside : {ray - (k > 0 ? 1 : 0), ray + (k + 1 < per_panel ? 1 : 0)}) {
+      if (beside == ray) continue;
+      const std::size_t begin = first_crossing[beside], end = first_crossing[beside + 1];
+      if (end - begin != pieces) return width;
+      const double left = piece > 0 ? crossings_[begin + piece - 1].radius : 0.0, right = piece < pieces ? crossings_[begin + piece].radius : 1.0;
+      most = std::max(most, right - left);
+    }
+    return most;
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    const Panel& panel = panels_[first + i / per_panel];
+    const double rim = rays_.radius[i];
+    const Vec3 e = direction(rays_.cosine[i], rays_.sine[i]);
+    const std::size_t crossing_begin = first_crossing[i], next = first_crossing[i + 1];
+    const auto nodes = [&](bool check, double angle) {
+      double left = 0.0, lift_left = 0.0;
+      for (std::size_t c = crossing_begin; c <= next; ++c) {
+        const double right = c < next ? crossings_[c].radius : 1.0;
+        const double lift_right = c < next ? crossings_[c].height - model_height(i, right) : 0.0;
+        if (c < next && (right - left < shortest || 1.0 - right < shortest)) continue;
+        // On faces it is the short last piece on which the pressure falls.
+        const int all = about_middle_ ? panel.nodes
+                        : mild_       ? nodes_between_mild(panel.nodes, right - left)
+                                      : nodes_on(panel.nodes, share_of(i, c - crossing_begin, right - left));
+        const GaussRule& gauss = gauss_rule(!check ? all : about_middle_ ? check_on_faces(all) : check_of(all));
+        for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+          const double along = gauss.node[j], r = left + (right - left) * along;
+          foot_.push_back(frame_.origin + (r * rim) * e);
+          height_.push_back(model_height(i, r) + lift_left + along * (lift_right - lift_left));
+          weight_.push_back(angle * turn_[i] * gauss.weight[j] * (right - left) * rim * rim * r * jacobian_);
+        }
+        left = right;
+        lift_left = lift_right;
+      }
+    };
+    ray_nodes_.push_back(foot_.size());
+    nodes(false, rule.weight[i % per_panel]);
+    ray_check_.push_back(foot_.size());
+    if (rule.gauss_weight[i % per_panel] > 0.0) nodes(true, rule.gauss_weight[i % per_panel]);
+  }
+  ray_nodes_.push_back(foot_.size());
+  node_.resize(foot_.size());
+  const double residual = residual_, lift = lift_, below = below_;
+  if (!solve_heights(pressure, error)) return false;
+  if (!integrate()) return false;
+  residual_ = std::max(residual_, residual);
+  lift_ = std::max(lift_, lift);
+  below_ += below;
+  for (std::size_t p = first; p < panels_.size(); ++p) keep_panel(panels_[p], rule, (p - first) * per_panel);
+  return true;
+}
+
+/// Whether points of the rim are neighbours: the rim leads from one to the next, and its radius changes as its slope says. Where a
+/// ray grazes the rim the radius jumps, and what lies beyond is not seen.
+bool PolarRuleSolver::rim_joins(std::size_t first, std::size_t last, bool closed) const {
+  const double least = about_star_ ? 0.0 : kLeastSight;
+  for (std::size_t i = first; i + (closed ? 0 : 1) < last; ++i) {
+    const RimPoint &p = kept_rim_[i], &q = kept_rim_[i + 1 < last ? i + 1 : first];
+    const Vec2 chord = q.at - p.at;
+    double steepest = 0.0;  // of the logarithm of the radius over the angle
+    for (const RimPoint* x : {&p, &q}) {
+      const Vec2 tangent(-x->outward.y(), x->outward.x());
+      const double sight = x->outward.dot(x->at);
+      if (!(sight > least * x->outward.norm() * x->at.norm())) return false;
+      if (!(tangent.dot(chord) >= kLeastAlong * tangent.norm() * chord.norm())) return false;
+      steepest = std::max(steepest, std::abs(tangent.dot(x->at)) / sight);
+    }
+    const double square_p = p.at.squaredNorm(), square_q = q.at.squaredNorm();
+    const double change = std::abs(square_q - square_p) / (square_p + square_q);
+    const double angle = std::abs(p.at.x() * q.at.y() - p.at.y() * q.at.x()) / std::sqrt(square_p * square_q);
+    if (!(change <= kMostChange * angle * (1.0 + steepest))) return false;
+  }
+  return true;
+}
+
+/// What Newton's method may have left of the way to the rim, over the radius: twice the larger of two estimates. One is half the square of its
+/// last step, times the second derivatives of the pressures, which the slopes at the rim and at the last node before it tell. The other has
+/// its rate from the steps of rays that took two or more.
+double PolarRuleSolver::rim_error(std::size_t ray, double rate) const {
+  const std::size_t i = ray_check_[ray] - 1;
+  const Vec3 &a = rim_batch_.slope_a[ray], &b = rim_batch_.slope_b[ray], reach = rays_.radius[ray] * direction(rays_.cosine[ray], rays_.sine[ray]);
+  const double at = a.dot(frame_.axis), bt = b.dot(frame_.axis), fall = b.dot(reach) * at - a.dot(reach) * bt;
+  const double turn = (a - node_.slope_a[i]).norm() * bt - (b - node_.slope_b[i]).norm() * at;
+  const double bend = turn / (fall * (rim_batch_.point[ray] - node_.point[i]).norm());
+  return moved_[ray] * std::max(bend, 2.0 * rate);
+}
+
+/// Adds up a panel's rays from `ray` on and keeps its nodes.
+void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray) {
+  panel.fine = panel.angular = panel.radial = {};
+  panel.highest = {};
+  panel.along = along_.size();
+  const std::size_t highest = rule.node.size() >= kFine ? panel.highest.size() : panel.highest.size() - 2;
+  panel.first = kept_.point.size();
+  double rim = 0.0, whole = 0.0, rate = 0.0;
+  for (std::size_t k = ray; k < ray + rule.node.size(); ++k) {
+    if (moved_[k] > 0.0) rate = std::max(rate, rim_left_[k] / moved_[k]);
+  }
+  for (std::size_t k = 0; k < rule.node.size(); ++k) {
+    PatchSums along;
+    for (std::size_t i = ray_nodes_[ray + k]; i < ray_check_[ray + k]; ++i) {
+      const Vec3 x = node_.point[i] - frame_.origin;
+      weigh(panel.fine, x, normal_[i], area_[i], pressure_[i]);
+      weigh(along, x, normal_[i], area_[i], pressure_[i]);
+    }
+    panel.angular.add(along, rule.gauss_weight[k] / rule.weight[k]);
+    if (mild_) along_.push_back({along, kept_.point.size(), kept_.point.size() + ray_check_[ray + k] - ray_nodes_[ray + k]});
+    for (std::size_t d = 0; d < highest; ++d) panel.highest[d].add(along, rule.highest[d][k]);
+    const double area = rule.weight[k] * turn_[ray + k] * rays_.radius[ray + k] * rays_.radius[ray + k];
+    rim += area * rim_error(ray + k, rate);
+    whole += area;
+    for_columns([&](auto& kept, const auto& node) {
+      kept.insert(kept.end(), node.begin() + static_cast<std::ptrdiff_t>(ray_nodes_[ray + k]),
+                  node.begin() + static_cast<std::ptrdiff_t>(ray_check_[ray + k]));
+    });
+    for (std::size_t i = ray_check_[ray + k]; i < ray_nodes_[ray + k + 1]; ++i) {
+      weigh(panel.radial, node_.point[i] - frame_.origin, normal_[i], area_[i], pressure_[i]);
+    }
+  }
+  panel.by_rim = rim / whole;
+  panel.rays = rule.node.size();
+  panel.last = kept_.point.size();
+}
+
+/// Gives the panels that are due the rays of Patterson's rule between those of Kronrod's, which they keep.
+bool PolarRuleSolver::extend_panels(PairPressure& pressure, double error) {
+  const std::size_t count = panels_.size();
+  std::vector<std::size_t> due;
+  for (std::size_t p = 0; p < count; ++p) {
+    if (!panels_[p].extend) continue;
+    due.push_back(p);
+    Panel added;
+    added.begin = panels_[p].begin;
+    added.end = panels_[p].end;
+    added.nodes = panels_[p].nodes;
+    panels_.push_back(added);
+  }
+  if (due.empty()) return true;
+  const KronrodRule& rule = patterson_additions();
+  if (!find_rays(pressure, rule, error, count) || !solve_panels(pressure, rule, error, count)) return false;
+  for (std::size_t k = 0; k < due.size(); ++k) merge(panels_[due[k]], panels_[count + k]);
+  panels_.resize(count);
+  return true;
+}
+
+/// A panel of 7 rays and the 8 between them become one of 15; what radii are off by has been told by the former.
+void PolarRuleSolver::merge(Panel& panel, const Panel& added) {
+  const KronrodRule &old = kronrod_rule(3), &rule = patterson_rule();
+  Panel merged = panel;
+  merged.angular = panel.fine;
+  merged.radial.add(panel.angular, -1.0);
+  merged.radial.add(panel.fine);
+  merged.fine = {};
+  merged.highest = {};
+  merged.first = kept_.point.size();
+  merged.rim = kept_rim_.size();
+  merged.along = along_.size();
+  for (std::size_t k = 0; k < rule.node.size(); ++k) {
+    const bool kept = k % 2 == 1;
+    const Panel& from = kept ? panel : added;
+    const RaySums ray = along_[from.along + k / 2];
+    const double share = kept ? rule.weight[k] / old.weight[k / 2] : 1.0;
+    PatchSums along;
+    along.add(ray.sums, share);
+    merged.fine.add(along);
+    for (std::size_t d = 0; d < merged.highest.size(); ++d) merged.highest[d].add(along, rule.highest[d][k]);
+    const std::size_t begin = kept_.point.size();
+    for_columns([&](auto& all, const auto&) {
+      all.resize(begin + ray.last - ray.first);
+      std::copy(all.begin() + static_cast<std::ptrdiff_t>(ray.first), all.begin() + static_cast<std::ptrdiff_t>(ray.last),
+                all.begin() + static_cast<std::ptrdiff_t>(begin));
+    });
+    for (std::size_t i = begin; i < kept_.point.size(); ++i) {
+      kept_weight_[i] *= share;
+      kept_area_[i] *= share;
+    }
+    along_.push_back({along, begin, kept_.point.size()});
+    kept_rim_.push_back(RimPoint(kept_rim_[from.rim + k / 2]));
+  }
+  merged.by_rim = std::max(panel.by_rim, added.by_rim);
+  merged.rays = rule.node.size();
+  merged.last = kept_.point.size();
+  merged.rim_end = kept_rim_.size();
+  merged.extend = false;
+  panel = merged;
+}
+
+/// What the coefficients of the highest degrees say that a panel's sums are off by, over those of `all`: nothing to speak of where they fall
+/// from one pair of degrees to the next, as the larger rule is exact to far higher ones; as much as they are where they hardly fall.
+/// Such coefficients are the null rules of Berntsen & Espelid 1991, ACM TOMS 17(2).
+double PolarRuleSolver::slow_decay(const Panel& panel, const PatchSums& all) {
+  std::array<double, 3> size;  // of pairs
+  const bool fine = panel.rays >= kFine;
+  for (std::size_t d = 0; d < (fine ? size.size() : 2); ++d) {
+    const double one = share_of_difference(panel.highest[2 * d], {}, all), other = share_of_difference(panel.highest[2 * d + 1], {}, all);
+    size[d] = std::sqrt(one * one + other * other);
+  }
+  const double high = size[0];
+  const double fall = std::min(1.0, std::max(high / size[1], fine ? size[1] / size[2] : 0.0)), cube = fall * fall * fall;
+  return high * std::min(fall, (fine ? 5.0 : 50.0) * cube * fall);
+}
+
+/// What the sums of a panel are off by at most, over those of `all`.
+void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) const {
+  const bool fine = panel.rays >= kFine;
+  panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
+  panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
+  if (mild_) {
+    // Rules agree by chance at any size, but it harms only where they differ by about what is asked for.
+    const double share = error < kMildPartedBelow ? std::clamp(kMildByChance * panel.by_angle / error, kMildAngle, 1.0) : kMildAngle;
+    panel.by_angle = std::max(share * panel.by_angle, slow_decay(panel, all));
+    panel.by_radius *= kMildRadius;
+    return;
+  }
+  if (about_middle_ && cut_) {
+    const double share = kBesideThirds * (panel.halved ? kHalf : 1.0);
+    panel.by_angle *= share;
+    panel.by_radius *= share;
+    return;
+  }
+  if (!all_kinks_) {
+    // Some may cross any panel, where rules converge slowly.
+    panel.by_angle = std::max(kUnknown * panel.by_angle, slow_decay(panel, all));
+    panel.by_radius *= kUnknown;
+    return;
+  }
+  // Over the panel itself: what differs so much is not the last digit of a rule that converges.
+  const double off = panel.fine.area > 0.0 ? panel.by_angle * all.area / panel.fine.area : 0.0;
+  const double on_faces = std::max(grows_as_root(panel)         ? kOnFacesAsRoot
+                                   : fine || panel.leaves ? kOnFacesDoubted
+                                   : panel.halved         ? kOnFacesHalved
+                                                          : kOnFaces,
+                                   std::min(kRegularOnFaces * std::sqrt(off), kHalf));
+  if (!panel.even()) {
+    const auto changes = static_cast<double>(panel.change_end - panel.change);
+    const double decay = about_middle_ ? std::min(kDecayOnFaces * slow_decay(panel, all), kHalf * panel.by_angle) : 0.0;
+    panel.by_angle *= panel.lost ? kLost : about_middle_ ? std::max(on_faces, kOnFacesUneven) : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
+    panel.by_angle = std::max(panel.by_angle, decay);
+  } else {
+    const double root = std::sqrt(panel.by_angle);
+    if (fine) {
+      panel.by_angle *= std::clamp(kRegular * root, cut_ ? kLeastHalved : kLeastFine, 1.0);
+    } else {
+      // Rays nearly touch kinks that are round.
+      const bool flat = std::all_of(sheets_.begin(), sheets_.end(), [](const Sheet& sheet) { return sheet.flat; });
+      const double share = std::max(kRegularCoarse * root, flat ? 0.0 : kRound * panel.by_angle * panel.by_angle);
+      panel.by_angle *= about_middle_ ? on_faces : std::clamp(share, cut_ || panel.halved ? kLeastHalved : kLeast, kHalf);
+    }
+    panel.by_angle = std::max(panel.by_angle, slow_decay(panel, all));
+  }
+  if (!about_middle_) {
+    panel.by_radius *= kRadial;
+    return;
+  }
+  const double relative = panel.fine.area > 0.0 ? panel.by_radius * all.area / panel.fine.area : 0.0;
+  const double slow = kSlowOnFaces * std::sqrt(std::sqrt(relative));
+  panel.by_radius *= panel.lost ? kHalf : fine ? kRadialOnFacesFine : std::clamp(slow, panel.nodes <= kFewOnFaces ? kRadialOnFacesFew : kRadialOnFaces, kHalf);
+}
+
+bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
+  const double error = settings.error;
+  cut_ = !crossing_.empty() && crossing_.back() >= kinks_.size();
+  const bool fine = error < 1e-4;
+  const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
+  const int radial = error >= 1e-3 ? 3 : !fine ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 10;
+  const double widest = fine ? kWidest : kWidestCoarse;
+  about_middle_ = by_sectors_ = mild_ = false;
+  for (;;) {
+    std::vector<Corner> corners;
+    find_corners(pressure, 0, corners);
+    struct Turn {
+      double angle;
+      bool touch;
+    };
+    std::vector<Turn> turns;
+    const auto add = [&](double x, double y, bool touch) {
+      const double turn = math::atan2(y, x);
+      turns.push_back({turn < 0.0 ? turn + kTurn : turn, touch});
+    };
+    for (const Corner& corner : corners) {
+      const Vec3 d = corner.at - frame_.origin;
+      add(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm(), false);
+    }
+    if (error < kSliversBelow) {
+      std::vector<double> hidden;
+      find_hidden_touches(pressure, corners, hidden);
+      for (const double angle : hidden) turns.push_back({angle < 0.0 ? angle + kTurn : angle, true});
+    }
+    for (const Imprint& imprint : imprints_) {
+      for (const Vec2& x : imprint.touches) add(x.x(), x.y(), true);
+    }
+    if (turns.empty()) turns.push_back({0.0, false});
+    std::sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return a.angle < b.angle; });
+    // Of those that are the same one stays, so that panels leave nothing out between them.
+    std::size_t last = 0;
+    for (const Turn& turn : turns) {
+      if (turn.angle - turns[last].angle >= kSameTurn) {
+        turns[++last] = turn;
+      } else {
+        turns[last].touch |= turn.touch;
+      }
+    }
+    if (last > 0 && turns.front().angle + kTurn - turns[last].angle < kSameTurn) turns.front().touch |= turns[last--].touch;
+    turns.resize(last + 1);
+    turns.push_back({turns.front().angle + kTurn, turns.front().touch});
+    panels_.clear();
+    for (std::size_t t = 0; t + 1 < turns.size(); ++t) {
+      const double width = turns[t + 1].angle - turns[t].angle;
+      const int parts = static_cast<int>(std::ceil(width / widest));
+      for (int i = 0; i < parts; ++i) {
+        Panel panel;
+        panel.begin = turns[t].angle + width * i / parts;
+        panel.end = turns[t].angle + width * (i + 1) / parts;
+        panel.touch_begin = turns[t].touch && i == 0;
+        panel.touch_end = turns[t + 1].touch && i + 1 == parts;
+        panel.nodes = radial;
+        panels_.push_back(panel);
+      }
+    }
+    const std::size_t crossing = crossing_.size();
+    if (!solve_all_panels(pressure, settings, rule, nullptr, true)) return false;
+    if (crossing_.size() == crossing) return true;
+  }
+}
+
+/// Kinks that only the points of the rim on all rays show to cross the patch; these points are kept. @return whether there are any
+bool PolarRuleSolver::add_missed_kinks() {
+  const std::size_t crossing = crossing_.size();
+  std::vector<double> sides(kept_rim_.size()), places;
+  fine_rim_.clear();
+  for (const RimPoint& p : kept_rim_) fine_rim_.push_back(frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis);
+  for (std::size_t k = 0; k < kinks_.size(); ++k) {
+    if (std::find(crossing_.begin(), crossing_.end(), k) != crossing_.end()) continue;
+    for (std::size_t i = 0; i < sides.size(); ++i) sides[i] = kinks_[k].value(fine_rim_[i]);
+    places.clear();
+    follow_signs(sides, places);
+    if (!places.empty()) crossing_.push_back(k);
+  }
+  if (crossing_.size() == crossing) return false;
+  std::sort(crossing_.begin(), crossing_.end());
+  return true;
+}
+
+/// Whether a strip beyond an edge begins at one of a panel's ends, as the root of the angle.
+bool PolarRuleSolver::grows_as_root(const Panel& panel) const {
+  if (!by_sectors_) return false;
+  const double whole = std::floor(panel.begin);
+  const Sector& sector = sectors_[static_cast<std::size_t>(whole)];
+  return (sector.strip_begin && !panel.touch_begin && panel.begin == whole) || (sector.strip_end && !panel.touch_end && panel.end == whole + 1.0);
+}
+
+/// What a panel may be off by in angle or radius so that all those which are not off by more are so by `most` together.
+double PolarRuleSolver::largest_to_leave(double most) const {
+  std::vector<double> off;
+  for (const Panel& panel : panels_) off.insert(off.end(), {panel.by_angle, panel.by_radius});
+  std::sort(off.begin(), off.end());
+  double sum = 0.0, largest = 0.0;
+  for (const double x : off) {
+    sum += x;
+    if (sum > most) break;
+    largest = x;
+  }
+  return largest;
+}
+
+/// Halves panels until the estimate is low enough; then nodes and sums of all are in place, unless `crossing_` grew.
+/// @param larger  rule that panels get before they are halved, or null
+/// @param look  whether kinks that cross the rim of all rays are added
+bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first,
+                                       const KronrodRule* larger, bool look) {
+  const KronrodRule* rule = &first;
+  const double error = settings.error;
+  kept_.resize(0);
+  kept_weight_.clear();
+  kept_area_.clear();
+  kept_pressure_.clear();
+  kept_normal_.clear();
+  kept_rim_.clear();
+  along_.clear();
+  changes_.clear();
+  residual_ = lift_ = below_ = rim_error_ = 0.0;
+  spread_ = widest_ = {};
+  std::size_t begin = 0, solved = panels_.size();
+  PatchSums all;
+  const bool beside = about_middle_ && cut_;
+  const std::size_t most = beside ? kMostBesideThirds : mild_ ? kMostMild : kMostPanels;
+  for (;;) {
+    if (begin < panels_.size()) {
+      if (!find_rays(pressure, *rule, error, begin)) return false;
+      if (begin == 0 && look && add_missed_kinks()) return true;
+      if (!solve_panels(pressure, *rule, error, begin)) return false;
+    }
+    if (!extend_panels(pressure, error)) return false;
+    all = {};
+    for (const Panel& panel : panels_) all.add(panel.fine);
+    if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
+    estimate_ = below_ / all.load;
+    rim_error_ = 0.0;
+    for (Panel& panel : panels_) {
+      doubt(panel, all, error);
+      estimate_ += panel.by_angle + panel.by_radius;
+      rim_error_ += panel.by_rim * panel.fine.area / all.area;
+    }
+    // Rules agree by chance where panels do not begin at the rim's corners.
+    const auto unseen = [&](const Panel& panel) { return panel.leaves && !panel.halved && panel.rays >= kFine && !beside; };
+    const bool enough = estimate_ <= kEnough * error;
+    if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= most) break;
+    // New ones go to the end; the angles are put in order when all is done.
+    const auto count = static_cast<double>(panels_.size());
+    const double share = mild_ ? largest_to_leave(0.75 * error) : 0.5 * error / count;
+    std::vector<Panel> finer;
+    bool by_angle = false;
+    std::size_t extended = 0;
+    std::erase_if(panels_, [&](Panel& panel) {
+      const bool more = !enough && panel.by_radius > share && panel.nodes < kMostRadial;
+      const bool part = (!enough && panel.by_angle > share) || unseen(panel);
+      if (!more && !part) return false;
+      if (mild_ && !more && panel.rays < kFine && panel.by_angle <= kExtended * share) {
+        panel.extend = true;
+        ++extended;
+        return false;
+      }
+      Panel next;
+      next.nodes = more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
+      next.begin = panel.begin;
+      const auto end_at = [&](double place, bool touch) {
+        if (!(place - next.begin > kSameTurn) || !(panel.end - place > kSameTurn)) return;
+        next.end = place;
+        next.touch_end = touch;
+        finer.push_back(next);
+        next.begin = next.end;
+        next.touch_begin = touch;
+      };
+      next.touch_begin = panel.touch_begin;
+      next.halved = panel.halved || (part && (larger == nullptr || unseen(panel)));
+      if (part && panel.change < panel.change_end && !beside && !mild_) {
+        for (std::size_t c = panel.change; c < panel.change_end; ++c) {
+          const std::optional<double> touch = changes_[c].touch ? touching_angle(pressure, *changes_[c].touch) : std::nullopt;
+          end_at(touch.value_or(changes_[c].place), touch.has_value());
+        }
+      } else if (part && larger == nullptr) {
+        end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end), false);
+      } else {
+        by_angle = by_angle || part;
+      }
+      next.end = panel.end;
+      next.touch_end = panel.touch_end;
+      finer.push_back(next);
+      return true;
+    });
+    if (finer.empty() && extended == 0) break;
+    if (larger != nullptr && by_angle) rule = std::exchange(larger, nullptr);
+    begin = panels_.size();
+    solved += finer.size() + extended;
+    panels_.insert(panels_.end(), finer.begin(), finer.end());
+  }
+  std::sort(panels_.begin(), panels_.end(), [](const Panel& a, const Panel& b) { return a.begin < b.begin; });
+  node_.resize(0);
+  weight_.clear();
+  area_.clear();
+  pressure_.clear();
+  normal_.clear();
+  fine_ = {};
+  for (const Panel& panel : panels_) {
+    for_columns([&panel](const auto& kept, auto& node) {
+      node.insert(node.end(), kept.begin() + static_cast<std::ptrdiff_t>(panel.first), kept.begin() + static_cast<std::ptrdiff_t>(panel.last));
+    });
+    fine_.add(panel.fine);
+  }
+  sorted_rim_.clear();
+  for (const Panel& panel : panels_) {
+    sorted_rim_.insert(sorted_rim_.end(), kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim),
+                       kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim_end));
+  }
+  kept_rim_.swap(sorted_rim_);
+  if (look && add_missed_kinks()) return true;
+  if (!about_middle_) {
+    if (!rim_joins(0, kept_rim_.size(), true)) return false;
+    polygon_ = kept_rim_;
+  }
+  node_.resize(node_.point.size());
+  estimate_ += (cut_ ? kUnseenBesideThirds : kUnseen) * error + algebraic_error();
+  return true;
+}
+
+}  // namespace supple::collision

@@ -1,0 +1,279 @@
+#include "surface/polar/polar_rule.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "surface/region/squeezed_region.h"
+
+namespace supple::collision {
+namespace {
+
+constexpr double kLeastAlong = 0.1;  // cosine of a way out of the apex to the axis
+constexpr double kLeastSight = 0.1;  // cosine of a body's normal to the ray, at the rim
+constexpr double kWidest = 1.3;      // across over along at the rim: energies by wider columns are off by more than asked
+constexpr double kEndsWithin = 1e-3;  // of the peak: ends beside the rim are that near to the other body's surface
+constexpr double kLong = 1.5;         // over the depth below the peak, to first order
+constexpr int kEndSteps = 40;
+constexpr int kMostOnColumn = 6;
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+}  // namespace
+
+/// Columns that hold the squeezed region of a body so deep that it is wider beyond Sigma spread so far that it falls away from them at the rim.
+/// @param outward  normal of the body at the rim   @param across  from the axis to the rim
+bool PolarRuleSolver::widen_columns(int side, const Vec3& outward, const Vec3& across) {
+  const double cosine = (side == 0 ? 1.0 : -1.0) * outward.dot(frame_.axis);
+  const double far = across.norm(), sight = outward.dot(across) / far, aim = std::min(kUpright, 0.5 * sight);
+  if (!(sight > kLeastSight)) return cosine > kLeastSight;
+  const double widened = (aim - cosine) / (sight - aim);
+  spread_[side] = std::max(spread_[side], widened / far);
+  widest_[side] = std::max(widest_[side], widened);
+  return true;
+}
+
+/// Distance from Sigma along the columns of a side, by their ways, to where the body's pressure vanishes; the last entry is the
+/// column through the peak.
+/// @param tolerance  of the last step, over the thickness   @param inside  the same of steps from where there is pressure
+bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double tolerance, double inside) {
+  const std::size_t n = node_.size() + 1;
+  std::vector<double>& end = end_[side];
+  end.resize(n);
+  line_point_.resize(n);
+  line_value_.resize(n);
+  line_slope_.resize(n);
+  low_.assign(n, 0.0);
+  high_.assign(n, extent_);
+  const double floor = 16.0 * kEpsilon * pressure.modulus(side);
+  for (std::size_t i = 0; i + 1 < n; ++i) {
+    const Vec3& g = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
+    const double fall = -g.dot(column(i).way);
+    end[i] = fall * frame_.depth[side] > 0.5 * pressure_[i] ? pressure_[i] / fall : 2.0 * frame_.depth[side];
+  }
+  end[n - 1] = frame_.depth[side];
+  reached_.resize(n);
+  open_.resize(n);
+  std::iota(open_.begin(), open_.end(), std::size_t{0});
+  for (int iteration = 0; iteration < kEndSteps; ++iteration) {
+    for (const std::size_t i : open_) {
+      reached_[i] = end[i];
+      line_point_[i] = (i + 1 < n ? node_.point[i] : peak_) + end[i] * column(i).way;
+    }
+    evaluate_on_lines(pressure, side);
+    std::erase_if(open_, [&](std::size_t i) {
+      const double fall = -line_slope_[i].dot(column(i).way), newton = end[i] + line_value_[i] / fall;
+      (line_value_[i] > 0.0 ? low_[i] : high_[i]) = end[i];
+      // Where a body is deep its pressure rises first; far beyond its surface the support may have ended.
+      const double next = fall > 0.0 && newton >= low_[i] && newton <= high_[i] ? newton : 0.5 * (low_[i] + high_[i]);
+      const double enough = line_value_[i] >= 0.0 ? inside : tolerance;
+      const bool near = std::abs(next - end[i]) <= enough * frame_.thickness || std::abs(line_value_[i]) <= floor;
+      end[i] = next;
+      return near;
+    });
+    if (open_.empty()) return true;
+  }
+  return false;
+}
+
+/// Values and slopes of one body at the open points of lines.
+void PolarRuleSolver::evaluate_on_lines(PairPressure& pressure, int side) {
+  const std::size_t n = open_.size();
+  if (n == line_point_.size()) return pressure.evaluate(side, line_point_, line_value_, line_slope_);
+  some_.resize(n);
+  for (std::size_t k = 0; k < n; ++k) some_.point[k] = line_point_[open_[k]];
+  pressure.evaluate(side, some_.point, some_.a, some_.slope_a);
+  for (std::size_t k = 0; k < n; ++k) {
+    line_value_[open_[k]] = some_.a[k];
+    line_slope_[open_[k]] = some_.slope_a[k];
+  }
+}
+
+/// Ways of the columns of a side, and how what they enclose widens; the last one is that through the peak. @return false where two of them meet
+bool PolarRuleSolver::start_columns(int side) {
+  const std::size_t n = node_.size();
+  const double sign = side == 0 ? 1.0 : -1.0, spread = spread_[side];
+  if (apex_[side] && start_out_of(*apex_[side], sign)) return true;
+  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, {1.0, 0.0, 0.0}});
+  if (spread == 0.0) return true;
+  for (std::size_t i = 0; i <= n; ++i) {
+    const Vec3 d = (i < n ? node_.point[i] : peak_) - frame_.origin, across = d - d.dot(frame_.axis) * frame_.axis;
+    Column& along = column_[i];
+    along.way += spread * across;
+    const double narrow = i < n ? 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis) : 1.0;
+    if (!(narrow > 0.0)) return false;
+    along.swept = {narrow, spread * (1.0 + narrow), spread * spread};
+  }
+  return true;
+}
+
+/// @return false where the rule's axis does not lead out of the apex
+bool PolarRuleSolver::start_out_of(const Apex& apex, double sign) {
+  const std::size_t n = node_.size();
+  column_.resize(n + 1);
+  for (std::size_t i = 0; i <= n; ++i) {
+    const Vec3 x = i < n ? node_.point[i] : peak_, way = apex.way(x), normal = i < n ? normal_[i] : frame_.axis;
+    const double along = sign * way.dot(frame_.axis);
+    if (!(along > kLeastAlong)) return false;
+    const double flux = sign * normal.dot(way) / (along * normal.dot(frame_.axis)), bend = 1.0 / (along * apex.distance(x));
+    column_[i] = {way / along, {flux, 2.0 * bend * flux, bend * bend * flux}};
+  }
+  return true;
+}
+
+/// Whether the body's pressure falls along all columns from where they begin. Where it rises first, Sigma lies beyond the middle of a body that may end
+/// elsewhere, too.
+bool PolarRuleSolver::lead_out(int side) const {
+  const std::vector<Vec3>& slope = side == 0 ? node_.slope_a : node_.slope_b;
+  for (std::size_t i = 0; i < node_.size(); ++i) {
+    const Vec3& way = column(i).way;
+    if (!(-slope[i].dot(way) > kLeastFall * slope[i].norm() * way.norm())) return false;
+  }
+  return true;
+}
+
+/// Whether columns that are long end within the other body. A body that reaches around it may press on from the near side of it to the far
+/// one: columns then lead through it to where that ends elsewhere.
+bool PolarRuleSolver::end_within(PairPressure& pressure, int side) {
+  line_point_.clear();
+  for (std::size_t i = 0; i < node_.size(); ++i) {
+    if (end_[side][i] > kLong * frame_.depth[side]) line_point_.push_back(node_.point[i] + end_[side][i] * column(i).way);
+  }
+  other_value_.resize(line_point_.size());
+  pressure.evaluate(1 - side, line_point_, other_value_);
+  const double least = -kEndsWithin * frame_.peak;
+  return std::all_of(other_value_.begin(), other_value_.end(), [least](double p) { return p >= least; });
+}
+
+/// Whether a convex body comes out of the other one beyond this patch: then it has another patch there, where what it loses ends, too. Sought from columns
+/// at whose end the pressure of the other body falls. @param ended  the columns are there; else lines along the axis
+bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended) {
+  constexpr std::size_t kFew = 8;
+  constexpr int kSteps = 4;
+  const std::size_t n = node_.size(), stride = (n + kFew - 1) / kFew;
+  const Vec3 axis = (side == 0 ? 1.0 : -1.0) * frame_.axis;
+  const auto way = [&](std::size_t i) { return ended ? column(i).way : axis; };
+  open_.clear();
+  for (std::size_t i = 0; i < n; i += stride) open_.push_back(i);
+  open_.push_back(n);
+  some_.resize(open_.size());
+  for (std::size_t k = 0; k < open_.size(); ++k) {
+    const std::size_t i = open_[k];
+    some_.point[k] = (i < n ? node_.point[i] : peak_) + (ended ? end_[side][i] : frame_.depth[side]) * way(i);
+  }
+  for (int step = 0; step < kSteps && !ended; ++step) {
+    pressure.evaluate(side, some_.point, some_.a, some_.slope_a);
+    for (std::size_t k = 0; k < open_.size(); ++k) {
+      const double fall = -some_.slope_a[k].dot(axis);
+      some_.point[k] += (fall > 0.0 ? std::clamp(some_.a[k] / fall, -frame_.depth[side], frame_.depth[side]) : frame_.depth[side]) * axis;
+    }
+  }
+  pressure.evaluate(1 - side, some_.point, some_.b, some_.slope_b);
+  for (std::size_t k = 0; k < open_.size(); ++k) {
+    if (some_.slope_b[k].dot(way(open_[k])) < 0.0 && comes_out(pressure, side, some_.point[k])) return true;
+  }
+  return false;
+}
+
+/// Whether the surface of a body leaves the other one near a place of it: by the place where their normals are the same, which is farthest out.
+bool PolarRuleSolver::comes_out(PairPressure& pressure, int side, Vec3 at) {
+  constexpr int kSteps = 40;
+  constexpr double kOnSurface = 1e-3, kAlike = 1e-3;  // of the feature size; between normals
+  const double size = pressure.feature_size(), out = -kEndsWithin * frame_.peak;
+  std::array<double, 1> own, other;
+  std::array<Vec3, 1> slope, other_slope;
+  for (int step = 0; step < kSteps; ++step) {
+    pressure.evaluate(side, {&at, 1}, own, slope);
+    pressure.evaluate(1 - side, {&at, 1}, other, other_slope);
+    const double steep = slope[0].norm(), other_steep = other_slope[0].norm();
+    if (!(steep > 0.0)) return false;
+    const Vec3 normal = -slope[0] / steep;
+    const double off = own[0] / steep;
+    const bool on_surface = std::abs(off) <= kOnSurface * size;
+    if (on_surface && other[0] < out) return true;
+    if (!(other_steep > 0.0)) return false;
+    const Vec3 aim = -other_slope[0] / other_steep, across = aim - aim.dot(normal) * normal;
+    if (on_surface && across.norm() < kAlike) return false;
+    at += std::clamp(off, -size, size) * normal + size * across;
+  }
+  return true;
+}
+
+/// @param nodes  of Gauss along a column, or as many as would be as exact
+bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points) {
+  const bool from_ends = region == Region::Sums;
+  const bool fits = widest_[side] <= kWidest && start_columns(side);
+  if (!pressure.field(side).convex() && !(fits && lead_out(side))) {
+    points.unsure[side] = true;
+    thickness_ += frame_.depth[side];
+    return true;
+  }
+  if (!fits) return false;
+  if (spread_[side] > 0.0 || apex_[side]) nodes = kMostOnColumn;
+  // The length is off by the square of the last step. From beyond the surface, where a kernel may change its formula, the slope is by as much as the place.
+  const double inside = std::min(1e-3, 0.1 * std::sqrt(error));
+  if (!column_ends(pressure, side, from_ends ? std::min(1e-3, error) : inside, inside)) return false;
+  if (!pressure.field(side).convex() && !apex_[side] && !end_within(pressure, side)) {
+    points.unsure[side] = true;
+    thickness_ += frame_.depth[side];
+    return true;
+  }
+  if (may_go_through_ && pressure.field(side).convex() && goes_through(pressure, side, true)) return false;
+  thickness_ += end_[side][summit_];
+  if (from_ends) {
+    add_energy_from_ends(pressure, nodes, side, points);
+  } else {
+    add_points(pressure, nodes, side, points);
+  }
+  return true;
+}
+
+/// Volume and energy of a side, these by the pressures and slopes at both ends of the columns, and by some between.
+void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, int side, PatchPoints& points) {
+  const std::size_t n = node_.size();
+  const TwoEndRule& rule = two_end_rule(nodes - 2);
+  const std::size_t between = rule.node.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3& begins = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
+    const Column& along = column(i);
+    points.displaced[side] += weight_[i] * along.volume(end_[side][i]);
+    const double length = reached_[i], last = line_value_[i], slope = line_slope_[i].dot(along.way);
+    const double rest = -0.5 * last * last / slope;  // to where the pressure vanishes
+    const double width = along.width(0.0), width_there = along.width(length);
+    const double first_slope = begins.dot(along.way) * width + pressure_[i] * along.widens(0.0);
+    const double last_slope = slope * width_there + last * along.widens(length);
+    const double sum = rule.end * (pressure_[i] * width + last * width_there) + rule.slope * length * (first_slope - last_slope);
+    points.energy[side] += weight_[i] * (length * sum + rest * width_there);
+  }
+  if (between == 0) return;
+  line_point_.resize(n * between);
+  line_value_.resize(n * between);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < between; ++j) line_point_[i * between + j] = node_.point[i] + (reached_[i] * rule.node[j]) * column(i).way;
+  }
+  pressure.evaluate(side, line_point_, line_value_);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < between; ++j) {
+      const double width = column(i).width(reached_[i] * rule.node[j]);
+      points.energy[side] += weight_[i] * reached_[i] * rule.weight[j] * width * line_value_[i * between + j];
+    }
+  }
+}
+
+/// Points of a squeezed region, and its sums by them.
+void PolarRuleSolver::add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points) {
+  const std::size_t n = node_.size();
+  const GaussRule& gauss = gauss_rule(nodes);
+  const std::size_t begin = points.volume_point.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double length = end_[side][i];
+    for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+      points.volume_point.push_back(node_.point[i] + (length * gauss.node[j]) * column(i).way);
+      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j] * column(i).width(length * gauss.node[j]));
+    }
+  }
+  add_to_region(pressure, side, begin, line_value_, points);
+}
+
+}  // namespace supple::collision

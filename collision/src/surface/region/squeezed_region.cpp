@@ -1,0 +1,221 @@
+#include "surface/region/squeezed_region.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "supple/core/error.h"
+#include "surface/quadrature.h"
+
+namespace supple::collision {
+namespace {
+
+constexpr int kAcross = 3, kAlong = 4;    // Gauss points of a cell, each way, and of a piece of a column
+constexpr double kPlacesInFeature = 8.0;  // on a column, to see the pieces of the region
+constexpr double kCellsInFeature = 2.0;   // each way, to see all of it
+constexpr double kFewestPlaces = 16.0, kMostPlaces = 512.0, kFewestCells = 4.0, kMostCells = 32.0;
+constexpr std::size_t kMostLeaves = 4096;
+constexpr double kKept = 0.5;           // of the error asked for: what cells that are not quartered may add up to
+constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns
+
+}  // namespace
+
+void add_to_region(PairPressure& pressure, int side, std::size_t begin, std::vector<double>& value, PatchPoints& points) {
+  points.volume_side.resize(points.volume_point.size(), static_cast<std::uint8_t>(side));
+  const auto added = std::span(points.volume_point).subspan(begin);
+  value.resize(added.size());
+  pressure.evaluate(side, added, value);
+  for (std::size_t i = 0; i < added.size(); ++i) {
+    points.displaced[side] += points.volume_weight[begin + i];
+    points.energy[side] += points.volume_weight[begin + i] * std::max(value[i], 0.0);
+  }
+}
+
+/// What is positive within the region, one after the other for all places: the own pressure, by how much that of the other body exceeds it, and
+/// by how much those of third ones, which of obstacles are held against its own [Pa].
+void SqueezedRegion::find_margins(const Lost& lost, std::span<const Vec3> at) {
+  const std::size_t n = at.size();
+  margin_.resize(margins(lost) * n);
+  const auto own = std::span(margin_).first(n), rest = std::span(margin_).subspan(n, n);
+  lost.pressure.evaluate(lost.side, at, own);
+  lost.pressure.evaluate(1 - lost.side, at, rest);
+  if (!lost.third.empty()) {
+    const auto spared = std::span(margin_).last(n);
+    std::copy(rest.begin(), rest.end(), spared.begin());
+    third_.resize(n);
+    for (const ContactBody* body : lost.third) {
+      // Of obstacles, which are one solid, only the one that presses hardest loses space.
+      const std::span<const double> harder = body->fixed && lost.pressure.body(lost.side).fixed ? own : rest;
+      body->field.evaluate(at, third_);
+      for (std::size_t i = 0; i < n; ++i) spared[i] = std::min(spared[i], harder[i] - body->material.modulus * third_[i]);
+    }
+  }
+  for (std::size_t i = 0; i < n && !lost.equal; ++i) rest[i] -= own[i];
+}
+
+/// Where margins change their sign along the columns, by halving and a straight line through the last two values. Each by itself: pieces of the region
+/// may be thin where what bounds them is not.
+void SqueezedRegion::find_changes(const Lost& lost) {
+  const double places = std::clamp(std::ceil(kPlacesInFeature * length_ / feature_), kFewestPlaces, kMostPlaces), step = length_ / places;
+  const std::size_t steps = static_cast<std::size_t>(places), row = steps + 1, n = from_.size() * row;
+  place_.clear();
+  for (const Vec3& x : from_) {
+    for (std::size_t k = 0; k < row; ++k) place_.push_back(x + (static_cast<double>(k) * step) * along_);
+  }
+  find_margins(lost, place_);
+  change_.clear();
+  positive_.assign(from_.size(), 0);
+  for (std::size_t c = 0; c < from_.size(); ++c) {
+    for (std::size_t j = 0; j < margins(lost); ++j) {
+      const double* const margin = &margin_[j * n + c * row];
+      positive_[c] += margin[0] > 0.0 ? 1 : 0;
+      for (std::size_t k = 1; k < row; ++k) {
+        if ((margin[k] > 0.0) == (margin[k - 1] > 0.0)) continue;
+        const double at = static_cast<double>(k) * step;
+        change_.push_back({c, j, at - step, at, margin[k - 1], margin[k]});
+      }
+    }
+  }
+  const double enough = kEndsOfError * lost.error * length_;
+  for (double gap = step; gap > enough; gap *= 0.5) {
+    place_.clear();
+    for (const Change& e : change_) place_.push_back(from_[e.column] + 0.5 * (e.low + e.high) * along_);
+    find_margins(lost, place_);
+    for (std::size_t i = 0; i < change_.size(); ++i) {
+      Change& e = change_[i];
+      const double margin = margin_[e.margin * change_.size() + i], middle = 0.5 * (e.low + e.high);
+      const bool lower = (margin > 0.0) == (e.at_low > 0.0);
+      (lower ? e.low : e.high) = middle;
+      (lower ? e.at_low : e.at_high) = margin;
+    }
+  }
+  std::sort(change_.begin(), change_.end(), [](const Change& p, const Change& q) { return std::pair(p.column, p.at()) < std::pair(q.column, q.at()); });
+}
+
+/// The sums of cells by their columns, whose points are appended.
+void SqueezedRegion::measure(const Lost& lost, std::span<Cell> cells) {
+  constexpr std::size_t kTogether = 32;  // as many places as stay near
+  for (std::size_t i = 0; i < cells.size(); i += kTogether) measure_block(lost, cells.subspan(i, std::min(kTogether, cells.size() - i)));
+}
+
+void SqueezedRegion::measure_block(const Lost& lost, std::span<Cell> cells) {
+  const GaussRule& across = gauss_rule(kAcross);
+  constexpr std::size_t kColumns = kAcross * kAcross;
+  from_.clear();
+  area_.clear();
+  for (const Cell& cell : cells) {
+    for (std::size_t i = 0; i < across.node.size(); ++i) {
+      for (std::size_t j = 0; j < across.node.size(); ++j) {
+        from_.push_back(origin_ + (cell.corner[0] + across.node[i] * cell.width[0]) * across_[0] + (cell.corner[1] + across.node[j] * cell.width[1]) * across_[1]);
+        area_.push_back(across.weight[i] * across.weight[j] * cell.width[0] * cell.width[1]);
+      }
+    }
+  }
+  find_changes(lost);
+  const std::size_t begin = point_.size();
+  auto next = change_.begin();
+  for (std::size_t c = 0; c < from_.size(); ++c) {
+    if (c % kColumns == 0) cells[c / kColumns].begin = point_.size();
+    double low = 0.0;
+    std::size_t positive = positive_[c];
+    for (; next != change_.end() && next->column == c; ++next) {
+      const double at = next->at();
+      if (positive == margins(lost)) add_piece(c, low, at);
+      low = at;
+      positive += next->at_high > 0.0 ? 1 : -1;
+    }
+    if (positive == margins(lost)) add_piece(c, low, length_);  // the overlap's box ends there
+    cells[c / kColumns].end = point_.size();
+  }
+  value_.resize(point_.size() - begin);
+  lost.pressure.evaluate(lost.side, std::span(point_).subspan(begin), value_);
+  for (Cell& cell : cells) {
+    for (std::size_t i = cell.begin; i < cell.end; ++i) {
+      cell.sums.volume += volume_[i];
+      cell.sums.energy += volume_[i] * value_[i - begin];
+    }
+  }
+}
+
+void SqueezedRegion::add_piece(std::size_t column, double low, double high) {
+  const GaussRule& along = gauss_rule(kAlong);
+  const double parts = std::max(std::ceil((high - low) / feature_), 1.0), length = (high - low) / parts;
+  for (double k = 0.0; k < parts; ++k) {
+    for (std::size_t j = 0; j < along.node.size(); ++j) {
+      point_.push_back(from_[column] + (low + (k + along.node[j]) * length) * along_);
+      volume_.push_back(area_[column] * length * along.weight[j]);
+    }
+  }
+}
+
+/// Quarters of `split_`, measured, join the others.
+void SqueezedRegion::quarter(const Lost& lost) {
+  quarter_.clear();
+  for (const Cell& cell : split_) {
+    const std::array<double, 2> half{0.5 * cell.width[0], 0.5 * cell.width[1]};
+    for (const double i : {0.0, 1.0}) {
+      for (const double j : {0.0, 1.0}) quarter_.push_back({.corner = {cell.corner[0] + i * half[0], cell.corner[1] + j * half[1]}, .width = half});
+    }
+  }
+  measure(lost, quarter_);
+  for (std::size_t k = 0; k < split_.size(); ++k) {
+    const std::span<Cell> quarters = std::span(quarter_).subspan(4 * k, 4);
+    Sums fine;
+    for (const Cell& q : quarters) fine.add(q.sums);
+    for (Cell& q : quarters) q.off = {0.25 * std::abs(fine.energy - split_[k].sums.energy), 0.25 * std::abs(fine.volume - split_[k].sums.volume)};
+  }
+  leaf_.insert(leaf_.end(), quarter_.begin(), quarter_.end());
+}
+
+/// Moves the cells that miss most to `split_`. @return whether there are such
+bool SqueezedRegion::choose(double error) {
+  Sums all;
+  for (const Cell& cell : leaf_) all.add(cell.sums);
+  const auto off = [&](const Cell& cell) { return all.energy > 0.0 ? std::max(cell.off.energy / all.energy, cell.off.volume / all.volume) : 0.0; };
+  double sum = 0.0;
+  for (const Cell& cell : leaf_) sum += off(cell);
+  if (!(sum > error)) return false;
+  std::stable_sort(leaf_.begin(), leaf_.end(), [&](const Cell& p, const Cell& q) { return off(p) < off(q); });
+  double kept = 0.0;
+  const auto first = std::find_if(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return (kept += off(cell)) > kKept * error; });
+  split_.assign(first, leaf_.end());
+  leaf_.erase(first, leaf_.end());
+  return true;
+}
+
+void SqueezedRegion::fill(const Lost& lost, const Box& overlap, const Vec3& across, PatchPoints& points) {
+  SUPPLE_EXPECTS(overlap.lower.allFinite() && overlap.upper.allFinite());
+  Eigen::Index axis = 0;
+  across.cwiseAbs().maxCoeff(&axis);
+  along_ = Vec3::Unit(axis);
+  across_ = {Vec3::Unit((axis + 1) % 3), Vec3::Unit((axis + 2) % 3)};
+  origin_ = overlap.lower;
+  length_ = overlap.extent()[axis];
+  feature_ = lost.pressure.feature_size();
+  std::array<double, 2> cells{}, width{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double range = overlap.extent().dot(across_[k]);
+    cells[k] = std::clamp(std::ceil(kCellsInFeature * range / feature_), kFewestCells, kMostCells);
+    width[k] = range / cells[k];
+  }
+  point_.clear();
+  volume_.clear();
+  leaf_.clear();
+  split_.clear();
+  for (double i = 0.0; i < cells[0]; ++i) {
+    for (double j = 0.0; j < cells[1]; ++j) split_.push_back({.corner = {i * width[0], j * width[1]}, .width = width});
+  }
+  measure(lost, split_);
+  for (quarter(lost); leaf_.size() < kMostLeaves && choose(lost.error);) quarter(lost);
+  const std::size_t begin = points.volume_point.size();
+  const auto append = [](auto& to, const auto& from, const Cell& cell) {
+    to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(cell.begin), from.begin() + static_cast<std::ptrdiff_t>(cell.end));
+  };
+  for (const Cell& cell : leaf_) {
+    append(points.volume_point, point_, cell);
+    append(points.volume_weight, volume_, cell);
+  }
+  add_to_region(lost.pressure, lost.side, begin, value_, points);
+}
+
+}  // namespace supple::collision
