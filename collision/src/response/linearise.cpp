@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "response/energy_loads.h"
 #include "supple/core/error.h"
 
 namespace supple::collision {
@@ -24,12 +25,6 @@ void add_shares(std::span<const std::uint32_t> particles, const implicit::FieldP
   }
 }
 
-Vec3 velocity_of_whole(const ContactBody& body, const Vec3& x) {
-  Vec3 v = body.velocity.empty() ? Vec3::Zero().eval() : body.velocity[0];
-  if (!body.angular_velocity.empty()) v += body.angular_velocity[0].cross(x - body.pose[0].position);
-  return v;
-}
-
 core::ObstacleSide obstacle_of(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
   if (b.empty()) return core::ObstacleSide::B;
   return a.empty() ? core::ObstacleSide::A : core::ObstacleSide::None;
@@ -42,43 +37,19 @@ double slope_of(double a, double b) { return a > 0.0 && b > 0.0 ? a * b / (a + b
 struct SidePoints {
   const ContactSurface& surface;
   std::size_t pair = 0;
-  std::size_t begin = 0, end = 0;                ///< on Sigma
-  std::size_t inner_begin = 0, inner_end = 0;    ///< in both squeezed regions
+  Range points;                                  ///< on Sigma
+  Range volume;                                  ///< in both squeezed regions
   std::uint8_t side = 0;                         ///< 0: A, 1: B
   [[nodiscard]] double sign() const { return side == 0 ? -1.0 : 1.0; }  ///< of the pressure along N, as a force on the body
 };
 
-/// Forces on parts from the energy: integral of grad p_k over the squeezed region. @return false: none is known
-bool add_energy_forces(const ContactBody& body, const SidePoints& at, LineariseScratch& scratch) {
-  scratch.inner_point.clear();
-  scratch.inner_weight.clear();
-  for (std::size_t i = at.inner_begin; i < at.inner_end; ++i) {
-    if (at.surface.volume_side[i] != at.side) continue;
-    scratch.inner_point.push_back(at.surface.volume_point[i]);
-    scratch.inner_weight.push_back(at.surface.volume_weight[i] * body.material.modulus);
-  }
-  if (scratch.inner_point.empty()) return false;
-  const implicit::FieldParts& parts = scratch.inner_parts;
-  body.field.evaluate_parts(scratch.inner_point, scratch.inner_parts);
-  for (std::size_t i = 0; i < scratch.inner_point.size(); ++i) {
-    for (std::uint32_t e = parts.offset[i]; e < parts.offset[i + 1]; ++e) {
-      const std::uint32_t k = parts.part[e];
-      const Vec3 f = scratch.inner_weight[i] * parts.gradient[e];
-      scratch.force[k] += f;
-      scratch.torque[k] += (scratch.inner_point[i] - body.pose[k].position).cross(f);
-      if (!parts.by_turn.empty()) scratch.torque[k] -= scratch.inner_weight[i] * parts.by_turn[e];
-    }
-  }
-  return true;
-}
-
 /// Takes from the parts what they get by their contributions on Sigma. @return integral of p dA [N]
 double take_contributions(const ContactBody& body, const SidePoints& at, const implicit::FieldParts& parts, LineariseScratch& scratch) {
   double load = 0.0;
-  for (std::size_t i = at.begin; i < at.end; ++i) {
+  for (std::size_t i = at.points.begin; i < at.points.end; ++i) {
     const double force = at.surface.area[i] * at.surface.pressure[i];
     const Vec3 f = at.sign() * force * at.surface.normal[i];
-    const std::size_t row = i - at.begin;
+    const std::size_t row = i - at.points.begin;
     double sum = 0.0;
     for (std::uint32_t e = parts.offset[row]; e < parts.offset[row + 1]; ++e) sum += parts.value[e];
     for (std::uint32_t e = parts.offset[row]; e < parts.offset[row + 1]; ++e) {
@@ -100,7 +71,7 @@ void add_split(const ContactBody& body, std::span<const std::uint32_t> particles
   scratch.force.assign(count, Vec3::Zero());
   scratch.torque.assign(count, Vec3::Zero());
   scratch.share.assign(count, 0.0);
-  if (!add_energy_forces(body, at, scratch)) return;
+  if (!add_energy_loads(body, squeezed_of(at.surface, at.volume), at.side, scratch.energy, scratch.force, scratch.torque)) return;
   const double load = take_contributions(body, at, parts, scratch);
   if (!(load > 0.0)) return;
   const Vec3& centre = at.surface.summary[at.pair].centre_of_pressure;
@@ -122,27 +93,27 @@ void add_split(const ContactBody& body, std::span<const std::uint32_t> particles
 
 }  // namespace
 
-void linearise_contacts(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface, SplitRule split,
-                        std::span<const std::span<const std::uint32_t>> particles, LineariseScratch& scratch, core::ContactPoints& out) {
+void linearise_contacts(const ReactionInputs& in, std::span<const std::span<const std::uint32_t>> particles, LineariseScratch& scratch,
+                        core::ContactPoints& out) {
+  const std::span<const ContactBody> bodies = in.bodies;
+  const ContactSurface& surface = in.surface;
   SUPPLE_EXPECTS(particles.size() == bodies.size());
   out.clear();
   out.offset.push_back(0);
-  std::size_t begin = 0, inner_begin = 0;
-  for (std::size_t k = 0; k < surface.summary.size(); ++k) {
-    std::size_t end = begin;
-    while (end < surface.pair.size() && surface.pair[end] == k) ++end;
-    std::size_t inner_end = inner_begin;
-    while (inner_end < surface.volume_pair.size() && surface.volume_pair[inner_end] == k) ++inner_end;
+  Range points, volume;
+  for (std::uint32_t k = 0; k < surface.summary.size(); ++k) {
+    points = advance_range(surface.pair, points.end, k);
+    volume = advance_range(surface.volume_pair, volume.end, k);
     const BodyPair& pair = surface.summary[k].bodies;
     const ContactBody &a = bodies[pair.a], &b = bodies[pair.b];
-    const PairMaterial material = material_of(bodies, rules, pair);
+    const PairMaterial material = material_of(bodies, in.rules, pair);
     const core::ObstacleSide obstacle = obstacle_of(particles[pair.a], particles[pair.b]);
     core::ContactPoints::Pair row{.begin = static_cast<std::uint32_t>(out.point.size()),
                                   .friction = material.friction,
                                   .dissipation = material.dissipation,
                                   .obstacle = obstacle};
-    const std::size_t n = end - begin;
-    const std::span<const Vec3> x = std::span(surface.point).subspan(begin, n);
+    const std::size_t n = points.end - points.begin;
+    const std::span<const Vec3> x = std::span(surface.point).subspan(points.begin, n);
     scratch.value.resize(n);
     scratch.gradient_a.resize(n);
     scratch.gradient_b.resize(n);
@@ -151,28 +122,26 @@ void linearise_contacts(std::span<const ContactBody> bodies, const ContactRules&
     if (particles[pair.a].size() > 1) a.field.evaluate_parts(x, scratch.parts_a);
     if (particles[pair.b].size() > 1) b.field.evaluate_parts(x, scratch.parts_b);
     for (std::size_t i = 0; i < n; ++i) {
-      const Vec3& normal = surface.normal[begin + i];
+      const Vec3& normal = surface.normal[points.begin + i];
       out.point.push_back(x[i]);
       out.normal.push_back(normal);
-      out.weight.push_back(surface.area[begin + i]);
-      out.pressure.push_back(surface.pressure[begin + i]);
+      out.weight.push_back(surface.area[points.begin + i]);
+      out.pressure.push_back(surface.pressure[points.begin + i]);
       out.slope.push_back(slope_of(-a.material.modulus * scratch.gradient_a[i].dot(normal), b.material.modulus * scratch.gradient_b[i].dot(normal)));
       out.obstacle_velocity.push_back(obstacle == core::ObstacleSide::None ? Vec3::Zero().eval()
-                                                                           : velocity_of_whole(obstacle == core::ObstacleSide::B ? b : a, x[i]));
+                                                                           : velocity_of(obstacle == core::ObstacleSide::B ? b : a, 0, x[i]));
       add_shares(particles[pair.a], scratch.parts_a, i, 1.0, out);
       add_shares(particles[pair.b], scratch.parts_b, i, -1.0, out);
       out.offset.push_back(static_cast<std::uint32_t>(out.particle.size()));
     }
     row.end = static_cast<std::uint32_t>(out.point.size());
     row.split_begin = static_cast<std::uint32_t>(out.split_particle.size());
-    SidePoints at{.surface = surface, .pair = k, .begin = begin, .end = end, .inner_begin = inner_begin, .inner_end = inner_end};
-    if (split == SplitRule::Energy && particles[pair.a].size() > 1) add_split(a, particles[pair.a], at, scratch.parts_a, scratch, out);
+    SidePoints at{.surface = surface, .pair = k, .points = points, .volume = volume};
+    if (in.settings.split == SplitRule::Energy && particles[pair.a].size() > 1) add_split(a, particles[pair.a], at, scratch.parts_a, scratch, out);
     at.side = 1;
-    if (split == SplitRule::Energy && particles[pair.b].size() > 1) add_split(b, particles[pair.b], at, scratch.parts_b, scratch, out);
+    if (in.settings.split == SplitRule::Energy && particles[pair.b].size() > 1) add_split(b, particles[pair.b], at, scratch.parts_b, scratch, out);
     row.split_end = static_cast<std::uint32_t>(out.split_particle.size());
     out.pair.push_back(row);
-    begin = end;
-    inner_begin = inner_end;
   }
 }
 

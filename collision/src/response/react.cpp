@@ -3,15 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "response/energy_loads.h"
 #include "supple/core/error.h"
 
 namespace supple::collision {
 namespace {
-
-/// Half-open range of the entries of `pair` that equal k; `pair` is sorted.
-struct Range {
-  std::size_t begin, end;
-};
 
 /// Sigma of a pair, and the elastic load on it.
 struct PairLoads {
@@ -21,19 +17,6 @@ struct PairLoads {
   Vec3 centre = Vec3::Zero();                           ///< of pressure
   Vec3 push = Vec3::Zero(), twist = Vec3::Zero();       ///< integrals of p N dA and of (x - centre) x p N dA
 };
-
-/// Columns of the squeezed regions of a pair.
-struct Squeezed {
-  std::span<const Vec3> point;
-  std::span<const double> weight;
-  std::span<const std::uint8_t> side;  ///< 0: in A, 1: in B
-};
-
-Range advance_range(const std::vector<std::uint32_t>& pair, std::size_t begin, std::uint32_t k) {
-  std::size_t end = begin;
-  while (end < pair.size() && pair[end] == k) ++end;
-  return {begin, end};
-}
 
 /// On one part: force, and torque about the part's centre.
 struct PartLoad {
@@ -107,24 +90,7 @@ class Side {
     elastic_torque_.assign(parts, Vec3::Zero());
     if (!share_out(on.load)) return;
 
-    const std::uint8_t side = sign() < 0.0 ? 0 : 1;
-    own_point_.clear();
-    own_weight_.clear();
-    for (std::size_t i = 0; i < volume.point.size(); ++i) {
-      if (volume.side[i] != side) continue;
-      own_point_.push_back(volume.point[i]);
-      own_weight_.push_back(volume.weight[i] * body_->material.modulus);
-    }
-    body_->field.evaluate_parts(own_point_, volume_rows_);
-    for (std::size_t i = 0; i < own_point_.size(); ++i) {
-      for (std::uint32_t e = volume_rows_.offset[i]; e < volume_rows_.offset[i + 1]; ++e) {
-        const std::size_t k = volume_rows_.part[e];
-        const Vec3 f = own_weight_[i] * volume_rows_.gradient[e];
-        elastic_force_[k] += f;
-        elastic_torque_[k] += (own_point_[i] - body_->pose[k].position).cross(f);
-        if (!volume_rows_.by_turn.empty()) elastic_torque_[k] -= own_weight_[i] * volume_rows_.by_turn[e];
-      }
-    }
+    add_energy_loads(*body_, volume, sign() < 0.0 ? 0 : 1, energy_, elastic_force_, elastic_torque_);
     Vec3 force_left = total, moment_left = moment;
     for (std::size_t k = 0; k < parts; ++k) {
       force_left -= elastic_force_[k];
@@ -191,9 +157,8 @@ class Side {
   double sign_ = 0.0;
   Vec3 drift_ = Vec3::Zero();
   Vec3 spin_ = Vec3::Zero();
-  implicit::FieldParts rows_, volume_rows_;
-  std::vector<Vec3> own_point_;
-  std::vector<double> own_weight_;
+  implicit::FieldParts rows_;
+  EnergyScratch energy_;
   std::vector<Vec3> force_, torque_, elastic_force_, elastic_torque_;
   std::vector<double> share_;  // mean contribution of each part over Sigma, weighted with p dA
 };
@@ -203,12 +168,6 @@ struct SpringLoad {
   Vec3 point, force, couple;
   double power = 0.0;  ///< that it takes from the motion [W]
 };
-
-Vec3 velocity_of(const ContactBody& body, std::size_t part, const Vec3& x) {
-  Vec3 v = body.velocity.empty() ? Vec3::Zero().eval() : body.velocity[part];
-  if (!body.angular_velocity.empty()) v += body.angular_velocity[part].cross(x - body.pose[part].position);
-  return v;
-}
 
 SpringLoad hold_by_spring(const StickSpring& spring, const ContactBody& a, const ContactBody& b, const StickRule& rule,
                           double friction, const PairLoads& on) {
@@ -248,6 +207,7 @@ struct PairReaction {
   std::span<PartLoad> elastic[2], dissipative[2];  ///< on the parts of A, of B
   Vec3 traction = Vec3::Zero();  ///< all of it, as a force on A
   double power = 0.0;            ///< that damping, friction and springs take [W]
+  double friction_speed = 0.0;   ///< below which friction falls to zero [m/s]; 0: no such friction
   bool touches = false;          ///< false: no points, and nothing else here counts
 };
 
@@ -313,11 +273,7 @@ PairLoads loads_of(const ContactSurface& surface, const PairOfSurface& which, st
 
 void add_elastic(SplitRule rule, const ContactSurface& surface, const Range& volume, const PairLoads& on, Side& side) {
   if (rule == SplitRule::Energy) {
-    const std::size_t n = volume.end - volume.begin;
-    side.add_by_energy({std::span(surface.volume_point).subspan(volume.begin, n),
-                        std::span(surface.volume_weight).subspan(volume.begin, n),
-                        std::span(surface.volume_side).subspan(volume.begin, n)},
-                       on);
+    side.add_by_energy(squeezed_of(surface, volume), on);
   } else if (side.single()) {
     side.add_whole(side.sign() * on.push, side.sign() * on.twist, on.centre);
   } else {
@@ -332,7 +288,7 @@ void react_pair(const ReactionInputs& in, const ContactCount& contacts, const Pa
   thread_local std::vector<double> load_buffer;
   const std::size_t n = points.end - points.begin;
   out.touches = n > 0;
-  out.power = 0.0;
+  out.power = out.friction_speed = 0.0;
   if (!out.touches) return;
   const BodyPair pair = surface.summary[k].bodies;
   const std::uint32_t body_of[2] = {pair.a, pair.b};
@@ -348,6 +304,7 @@ void react_pair(const ReactionInputs& in, const ContactCount& contacts, const Pa
   if (rubs || material.dissipation > 0.0) {
     const Slip slip(sides);
     const double slow = rubs ? regularisation_of(settings, contacts, pair, material.friction, on, sides) : 0.0;
+    out.friction_speed = slow;
     double power = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
       const Vec3& x = on.x[i];
@@ -439,6 +396,7 @@ ReactionReport react(const ReactionInputs& in, const Executor& executor, const R
   const std::size_t pairs = surface.summary.size();
   if (out.traction_force != nullptr) out.traction_force->assign(pairs, Vec3::Zero());
   if (out.pair_power != nullptr) out.pair_power->assign(pairs, 0.0);
+  if (out.friction_speed != nullptr) out.friction_speed->assign(pairs, 0.0);
   thread_local Reactions kept;
   Reactions& all = kept;  // of the calling thread, whoever fills it
   all.begin(bodies, surface.summary);
@@ -468,6 +426,7 @@ ReactionReport react(const ReactionInputs& in, const Executor& executor, const R
         react_pair(in, all.contacts, {k, points, volume}, reaction);
         if (!reaction.touches) continue;
         if (out.pair_power != nullptr) (*out.pair_power)[k] = reaction.power;
+        if (out.friction_speed != nullptr) (*out.friction_speed)[k] = reaction.friction_speed;
         if (out.traction_force != nullptr) (*out.traction_force)[k] = reaction.traction;
       }
     });

@@ -37,29 +37,41 @@ bool PairLists::holds(std::span<const Vec3> positions, const Executor& executor)
 
 std::uint64_t PairLists::update(std::span<const Vec3> positions, const Executor& executor) {
   if (particle_.empty() || holds(positions, executor)) return 0;
-  reference_.resize(particle_.size());
-  for (std::size_t k = 0; k < particle_.size(); ++k) reference_[k] = positions[particle_[k]];
-  cells_.sort(reference_, (1.0 + kSkin) * range_, executor);
+  std::vector<Vec3> found_at = std::exchange(reference_, {});  // lists that are not finished have none: an exception may end this call
+  found_at.resize(particle_.size());
+  for (std::size_t k = 0; k < particle_.size(); ++k) found_at[k] = positions[particle_[k]];
+  cells_.sort(found_at, (1.0 + kSkin) * range_, executor);
   if (block_.size() < cells_.blocks()) block_.resize(cells_.blocks());
   while (scratch_.size() < static_cast<std::size_t>(executor.threads())) scratch_.push_back(std::make_unique<Scratch>());
   std::mutex lock;
   std::atomic<std::uint64_t> distances = 0;
-  const auto body = [&](std::size_t begin, std::size_t end) {
-    std::unique_ptr<Scratch> scratch;
-    {
+  /// One of the scratches, given back however its block ends: the next blocks are begun all the same.
+  struct Borrowed {
+    Borrowed(std::vector<std::unique_ptr<Scratch>>& unused_now, std::mutex& mutex) : unused(unused_now), lock(mutex) {
       const std::lock_guard guard(lock);
-      scratch = std::move(scratch_.back());
-      scratch_.pop_back();
+      scratch = std::move(unused.back());
+      unused.pop_back();
     }
+    ~Borrowed() {
+      const std::lock_guard guard(lock);
+      unused.push_back(std::move(scratch));  // has room: it came from there
+    }
+    Borrowed(const Borrowed&) = delete;
+    Borrowed& operator=(const Borrowed&) = delete;
+    std::vector<std::unique_ptr<Scratch>>& unused;
+    std::mutex& lock;
+    std::unique_ptr<Scratch> scratch;
+  };
+  const auto body = [&](std::size_t begin, std::size_t end) {
+    const Borrowed borrowed(scratch_, lock);
     for (std::size_t b = begin; b < end; ++b) {
-      cells_.search(b, 1, scratch->near);
-      distances += scratch->near.distances;
-      fill(*scratch, block_[b]);
+      cells_.search(b, 1, borrowed.scratch->near);
+      distances += borrowed.scratch->near.distances;
+      fill(*borrowed.scratch, block_[b]);
     }
-    const std::lock_guard guard(lock);
-    scratch_.push_back(std::move(scratch));
   };
   executor.for_blocks(cells_.blocks(), 1, std::cref(body));
+  reference_ = std::move(found_at);
   return distances;
 }
 

@@ -6,7 +6,6 @@
 
 #include "file/fields_info.h"
 #include "file/scene_places.h"
-#include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
 namespace {
@@ -75,20 +74,20 @@ class Includes {
     if (name.kind != Node::Kind::Scalar || name.text.empty()) return fail("expected the name of a file", name.described(), "");
     std::error_code unknown;
     const std::filesystem::path path = folder / name.text;
-    const std::filesystem::path real = std::filesystem::weakly_canonical(path, unknown);
-    const std::filesystem::path top = std::filesystem::weakly_canonical(folder_, unknown);
+    const std::filesystem::path real = std::filesystem::weakly_canonical(std::filesystem::absolute(path, unknown), unknown);
+    const std::filesystem::path top = std::filesystem::weakly_canonical(std::filesystem::absolute(folder_, unknown), unknown);
     const auto [end, rest] = std::mismatch(top.begin(), top.end(), real.begin(), real.end());
-    if (unknown || end != top.end()) return fail("expected a file in the scene's folder", '\'' + shown(name.text) + '\'', "");
+    if (unknown || end != top.end()) return fail("expected a file inside the scene's folder", '\'' + shown(name.text) + '\'', "");
     if (std::find(open_.begin(), open_.end(), real) != open_.end()) return fail("expected files that do not include one another in a circle", '\'' + shown(name.text) + '\'', "");
     if (++files_ > kMostIncludes) return fail("expected at most " + std::to_string(kMostIncludes) + " included files", "more", "");
-    if (!std::filesystem::is_regular_file(real, unknown)) {
-      return fail("expected a readable scene file", std::filesystem::exists(real, unknown) ? "no regular file" : "nothing", "");
+    std::optional<std::string> text;
+    try {
+      text = read_text(named_file(folder, name.text));
+    } catch (const Error& error) {
+      return fail(error.faults().front().expected, error.faults().front().found, "");
     }
-    std::string text(kLargestText + 1, '\0');
-    const auto size = io::read_start(real, std::as_writable_bytes(std::span(text)));
-    if (!size) return fail("expected a readable scene file", "a file that cannot be read", "");
-    text.resize(*size);
-    const std::uint32_t source = texts_.add(path.string(), std::move(text), false);
+    if (!text) return fail("expected a readable scene file", std::filesystem::exists(real, unknown) ? "a file that cannot be read" : "nothing", "");
+    const std::uint32_t source = texts_.add(path.string(), std::move(*text), false);
     Node* root = parse_yaml(texts_.text(source), source, tree_, faults_);
     if (root == nullptr) return nullptr;
     if (root->kind != Node::Kind::Mapping) return fail("expected a file with a mapping", root->described(), "");
@@ -187,6 +186,9 @@ std::optional<Value> Expansion::find(std::string_view name) {
 /// A scalar whose expressions have become values: one expression alone keeps its unit, others become text. @throws ExpressionFault
 Value Expansion::value_of(const Node& scalar) {
   const FindVariable variables = [this](std::string_view name) { return find(name); };
+  std::vector<std::string_view> names;
+  for (const auto& variable : variables_) names.push_back(variable.first);
+  for (const Index& index : indices_) names.push_back(index.name);
   const std::string_view text = scalar.text;
   if (text.find(kOpening) == std::string_view::npos) {
     const std::optional<KnownUnit> quantity = read_any_quantity(text);
@@ -207,7 +209,7 @@ Value Expansion::value_of(const Node& scalar) {
     }
     const std::size_t end = text.find('}', begin);
     if (end == std::string_view::npos) throw ExpressionFault{"expected '}' at the end of an expression", '\'' + shown(text.substr(begin)) + '\'', ""};
-    const Value value = evaluate_expression(text.substr(begin + kOpening.size(), end - begin - kOpening.size()), variables);
+    const Value value = evaluate_expression(text.substr(begin + kOpening.size(), end - begin - kOpening.size()), variables, names);
     if (begin == 0 && end + 1 == text.size()) return value;
     out.text += value.spelt();
     at = end + 1;

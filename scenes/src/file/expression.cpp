@@ -36,15 +36,18 @@ bool in_name(char c) { return begins_name(c) || (c >= '0' && c <= '9'); }
 bool begins_unit(char c) { return begins_name(c) || c == '%' || (static_cast<unsigned char>(c) & 0x80U) != 0; }
 
 std::string kind_of(const Dimension& dimension) {
-  const std::string unit = si_unit(dimension);
-  return unit.empty() ? "a number without unit" : "a quantity in " + unit;
+  if (dimension == Dimension{}) return "a number without unit";
+  const std::string_view noun = noun_of(dimension);
+  if (noun.empty()) return "a quantity in " + si_unit(dimension);
+  return with_article(noun) + " [" + si_unit(dimension) + ']';
 }
 
 Value pure(double number) { return {.number = number, .dimension = {}, .text = {}}; }
 
 class Parser {
  public:
-  Parser(std::string_view text, const FindVariable& variables) : text_(text), variables_(variables) {}
+  Parser(std::string_view text, const FindVariable& variables, std::span<const std::string_view> known)
+      : text_(text), variables_(variables), known_(known) {}
 
   Value all() {
     const Value value = sum();
@@ -179,7 +182,7 @@ class Parser {
     if (name == "pi") return pure(std::numbers::pi);
     if (std::optional<Value> value = variables_(name)) return *value;
     if (const std::optional<KnownUnit> unit = unit_named(name)) return {.number = unit->factor, .dimension = unit->dimension, .text = {}};
-    fail("expected a variable, a unit or a function", '\'' + shown(name) + '\'', "variables are declared under `variables`");
+    fail("expected a variable, a unit or a function", '\'' + shown(name) + '\'', known_.empty() ? "variables are declared under `variables`" : known_hint(name, known_));
   }
 
   Value call(const Function& function) {
@@ -271,6 +274,7 @@ class Parser {
 
   std::string_view text_;
   const FindVariable& variables_;
+  std::span<const std::string_view> known_;
   std::size_t at_ = 0;
   int depth_ = 0;
 };
@@ -283,7 +287,9 @@ std::string Value::spelt() const {
   return number_text(number) + (unit.empty() ? "" : ' ' + unit);
 }
 
-Value evaluate_expression(std::string_view text, const FindVariable& variables) { return Parser(text, variables).all(); }
+Value evaluate_expression(std::string_view text, const FindVariable& variables, std::span<const std::string_view> known) {
+  return Parser(text, variables, known).all();
+}
 
 std::optional<ExpressionFault> fault_of_name(std::string_view name) {
   const bool word = !name.empty() && begins_name(name.front()) && std::all_of(name.begin(), name.end(), in_name);

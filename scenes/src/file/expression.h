@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -34,8 +35,8 @@ using FindVariable = std::function<std::optional<Value>(std::string_view)>;
 
 /// The value of the text between "${" and "}". Grammar: sums of products of powers; a number may be followed by units ("2 cm", "3 N s"),
 /// which belong to it; a name is a variable, a unit, `pi` or a function: sqrt, abs, min, max, floor, ceil, round, exp, log, sin, cos, tan,
-/// asin, acos, atan, atan2. Dimensions are checked. @throws ExpressionFault
-[[nodiscard]] Value evaluate_expression(std::string_view text, const FindVariable& variables);
+/// asin, acos, atan, atan2. Dimensions are checked. @param known  names of variables, for hints  @throws ExpressionFault
+[[nodiscard]] Value evaluate_expression(std::string_view text, const FindVariable& variables, std::span<const std::string_view> known = {});
 
 /// Whether a variable may have this name: a word that is no unit, function or constant. Otherwise what is wrong with it.
 [[nodiscard]] std::optional<ExpressionFault> fault_of_name(std::string_view name);

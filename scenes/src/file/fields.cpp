@@ -8,8 +8,7 @@ namespace supple::scenes {
 
 std::string rule_text(const Rule& rule, bool whole) {
   if (rule.low == rule.high) return number_text(rule.low);
-  std::string text = whole ? "whole number" : std::string(rule.quantity.noun);
-  text = (std::string_view("aei").find(text[0]) != std::string_view::npos ? "an " : "a ") + text;
+  std::string text = with_article(whole ? "whole number" : rule.quantity.noun);
   const bool low = std::isfinite(rule.low);
   const bool high = std::isfinite(rule.high);
   if (low && high) {

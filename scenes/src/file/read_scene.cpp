@@ -12,7 +12,6 @@
 #include "file/read_scene_archive.h"
 #include "file/scene_keys.h"
 #include "file/scene_places.h"
-#include "supple/core/io/atomic_file.h"
 #include "supple/scenes/accuracy.h"
 
 namespace supple::scenes {
@@ -232,11 +231,9 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
   if (std::filesystem::is_directory(path, status)) fail("a folder");
   const std::string name = path.filename().string();  // outputs have this name, also in files that cannot hold any name
   if (std::any_of(name.begin(), name.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7F; })) fail("a name with control characters");
-  std::string text(kLargestText + 1, '\0');  // one byte more than allowed, to detect larger files
-  const auto size = io::read_start(path, std::as_writable_bytes(std::span(text)));
-  if (!size) fail(std::filesystem::exists(path, status) ? "a file that cannot be read" : "nothing");
-  text.resize(*size);
-  Scene scene = parse_scene(text, path.string(), path.parent_path(), overrides);
+  const std::optional<std::string> text = read_text(path);
+  if (!text) fail(std::filesystem::exists(path, status) ? "a file that cannot be read" : "nothing");
+  Scene scene = parse_scene(*text, path.string(), path.parent_path(), overrides);
   scene.source = path;
   return scene;
 }

@@ -92,6 +92,11 @@ std::string shown(std::string_view text) {
   return out;
 }
 
+std::string with_article(std::string_view noun) {
+  const bool vowel = !noun.empty() && std::string_view("aei").find(noun[0]) != std::string_view::npos;
+  return (vowel ? "an " : "a ") + std::string(noun);
+}
+
 std::string number_text(double value) {
   std::array<char, 32> text{};
   const bool whole = std::abs(value) < 1e9 && value == std::floor(value);

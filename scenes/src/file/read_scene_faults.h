@@ -69,6 +69,8 @@ class FaultList {
 
 /// Text safe to show: control characters escaped, at most 60 characters.
 [[nodiscard]] std::string shown(std::string_view text);
+/// "a length", "an angle".
+[[nodiscard]] std::string with_article(std::string_view noun);
 /// Shortest text that reads back as the same number.
 [[nodiscard]] std::string number_text(double value);
 /// Six significant digits, for computed values.

@@ -1,6 +1,9 @@
 #include "file/scene_places.h"
 
+#include <span>
 #include <system_error>
+
+#include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
 
@@ -21,6 +24,14 @@ std::filesystem::path named_file(const std::filesystem::path& folder, const std:
                                             : std::filesystem::is_fifo(status)    ? "a pipe"
                                                                                   : "a device or a socket",
                                    .hint = {}});
+}
+
+std::optional<std::string> read_text(const std::filesystem::path& path) {
+  std::string text(kLargestText + 1, '\0');
+  const auto size = io::read_start(path, std::as_writable_bytes(std::span(text)));
+  if (!size) return std::nullopt;
+  text.resize(*size);
+  return text;
 }
 
 void rethrow_with_places(const Scene& scene, const Error& error) {

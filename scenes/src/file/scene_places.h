@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -39,6 +40,9 @@ auto read_for(const std::string& key, Read&& read) try {
 /// Path of a file that a scene in this folder names. @throws Error{Io} where that is a pipe, a device or a folder: reading it may
 /// never end
 [[nodiscard]] std::filesystem::path named_file(const std::filesystem::path& folder, const std::string& name);
+
+/// The text of a scene file, at most one byte more than `parse_yaml` takes, so that it refuses larger ones; none where it cannot be read.
+[[nodiscard]] std::optional<std::string> read_text(const std::filesystem::path& path);
 
 /// Throws the error again with the positions of its keys.
 [[noreturn]] void rethrow_with_places(const Scene& scene, const Error& error);

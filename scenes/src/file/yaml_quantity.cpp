@@ -233,16 +233,6 @@ UnitText read_unit(std::string_view text, const Dimension& wanted) {
   return out;
 }
 
-std::string_view noun_of(const Dimension& dimension) {
-  if (dimension == kTorque.dimension) return "energy or torque";
-  for (const Quantity& q : {kNumber, kLength, kMass, kTime, kRate, kAngle, kSpeed, kSpin, kAcceleration, kForce,
-                            kPressure, kStiffness, kDamping, kAngularDamping, kSlope, kInverseArea, kInverseSpeed,
-                            kVolume}) {
-    if (q.dimension == dimension) return q.noun;
-  }
-  return "";
-}
-
 /// The same exponents; an angle may also be left out ("1/s" for rad/s).
 bool matches(Dimension found, Dimension wanted) {
   if (found == wanted) return true;
@@ -315,6 +305,16 @@ QuantityText read_quantity(std::string_view text, const Quantity& quantity) {
   out.ok = in_range(out.value);
   if (!out.ok) out.hint = kRangeHint;
   return out;
+}
+
+std::string_view noun_of(const Dimension& dimension) {
+  if (dimension == kTorque.dimension) return "energy or torque";
+  for (const Quantity& q : {kNumber, kLength, kMass, kTime, kRate, kAngle, kSpeed, kSpin, kAcceleration, kForce,
+                            kPressure, kStiffness, kDamping, kAngularDamping, kSlope, kInverseArea, kInverseSpeed,
+                            kVolume}) {
+    if (q.dimension == dimension) return q.noun;
+  }
+  return "";
 }
 
 Dimension operator*(const Dimension& a, const Dimension& b) {

@@ -22,6 +22,8 @@ struct Dimension {
 [[nodiscard]] Dimension inverse(const Dimension& a);
 /// The dimension whose square this is, if there is one.
 [[nodiscard]] std::optional<Dimension> root_of(const Dimension& a);
+/// "length", "energy or torque"; "" where there is no word.
+[[nodiscard]] std::string_view noun_of(const Dimension& dimension);
 /// "kg m/s^2"; "" of a pure number.
 [[nodiscard]] std::string si_unit(const Dimension& dimension);
 

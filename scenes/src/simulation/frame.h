@@ -87,6 +87,7 @@ struct Frame {
   collision::ReactionReport reaction;
   std::vector<Vec3> traction_force;           ///< by pair of `surface`
   std::vector<double> pair_power;             ///< dissipated by damping and friction [W], by pair of `surface`
+  std::vector<double> friction_speed;         ///< below which friction falls to zero [m/s], 0 without friction, by pair of `surface`
   collision::LineariseScratch linearise;      ///< of implicit steps
 
   // resting bodies, placed once

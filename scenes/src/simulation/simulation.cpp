@@ -148,8 +148,13 @@ void Simulation::Impl::make_step() {
                                                   {executor, workspace, integrator_workspace});
     if (contact.find) {
       frame.pair_power.resize(contact.load.size());
-      for (std::size_t k = 0; k < contact.load.size(); ++k) frame.pair_power[k] = contact.load[k].dissipated / dt();
-      friction.look(context(), frame, contact.load);
+      frame.friction_speed.resize(contact.load.size());
+      for (std::size_t k = 0; k < contact.load.size(); ++k) {
+        frame.pair_power[k] = contact.load[k].dissipated / dt();
+        const double friction_of_pair = collision::material_of(frame.bodies, rules, frame.surface.summary[k].bodies).friction;
+        frame.friction_speed[k] = friction_of_pair > 0.0 ? contact.load[k].stick_speed : 0.0;
+      }
+      friction.look(context(), frame);
     }
     book_work(report);
     ++p.calls;

@@ -155,6 +155,7 @@ void clear_reactions(Frame& frame) {
   frame.reaction = {};
   frame.traction_force.clear();
   frame.pair_power.clear();
+  frame.friction_speed.clear();
 }
 
 void clear_loads(const StageContext& context, Frame& frame) {
@@ -289,7 +290,7 @@ void react(const StageContext& context, Frame& frame, core::ForceSample& out) {
   collision::ReactionSettings settings = model.reaction;
   settings.step = context.step;
   frame.reaction = collision::react({frame.bodies, context.rules, frame.surface, settings, context.sticks}, context.executor,
-                                    {frame.loads, frame.dissipative, &frame.traction_force, &frame.pair_power});
+                                    {frame.loads, frame.dissipative, &frame.traction_force, &frame.pair_power, &frame.friction_speed});
   const bool dissipates = frame.reaction.dissipated_power != 0.0 || model.reaction.stick.stiffness > 0.0;
   if (dissipates) out.dissipative.reset(model.particles.size());
   add_loads(context, frame, dissipates, out);
@@ -305,7 +306,7 @@ void linearise(const StageContext& context, Frame& frame, core::ContactPoints& o
   StageTimer timer(profile, context.timed);
   std::vector<std::span<const std::uint32_t>> particles(frame.bodies.size());
   for (std::size_t i = 0; i < context.bodies.size(); ++i) particles[i] = context.bodies[i].particle;
-  collision::linearise_contacts(frame.bodies, context.rules, frame.surface, context.model.reaction.split, particles, frame.linearise, out);
+  collision::linearise_contacts({frame.bodies, context.rules, frame.surface, context.model.reaction}, particles, frame.linearise, out);
   profile.visited += frame.surface.point.size();
   profile.present += frame.surface.point.size();
 }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "core/support.h"
 #include "supple/core/neighbours.h"
@@ -132,6 +133,20 @@ TEST(PairLists, AreKeptUntilAParticleHasMovedHalfTheSkin) {
   points[299] = start[299] + Vec3(0.0, 0.0751, 0.0);
   EXPECT_GT(lists.update(points, executor), 0U);
   EXPECT_EQ(lists.update(points, executor), 0U);
+}
+
+TEST(PairLists, ThatAnExceptionBreaksOffAreFoundAgain) {
+  const std::vector<Vec3> points = make_cloud(700, 63);
+  bool fails = true;
+  int asked = 0;
+  PairLists lists = make_lists(700, [&](std::uint32_t, std::uint32_t) {
+    if (fails && ++asked == 1000) throw std::runtime_error("broken off");
+    return true;
+  });
+  EXPECT_THROW(lists.update(points, Executor(1)), std::runtime_error);
+  fails = false;
+  EXPECT_GT(lists.update(points, Executor(1)), 0U);
+  expect_near(entries_of(lists, 700), points);
 }
 
 TEST(PairLists, AreTheSameForEveryNumberOfThreadsAndEveryVectorWidth) {

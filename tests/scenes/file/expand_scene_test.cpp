@@ -48,8 +48,8 @@ TEST(Expression, KeepsUnits) {
 }
 
 TEST(Expression, SaysWhatIsWrong) {
-  EXPECT_EQ(fault_of("1 m + 1 s").expected, "expected a quantity in m after '+'");
-  EXPECT_EQ(fault_of("1 m + 1 s").found, "a quantity in s");
+  EXPECT_EQ(fault_of("1 m + 1 s").expected, "expected a length [m] after '+'");
+  EXPECT_EQ(fault_of("1 m + 1 s").found, "a time [s]");
   EXPECT_EQ(fault_of("1 +").found, "the end of the expression");
   EXPECT_EQ(fault_of("(1").expected, "expected ')'");
   EXPECT_EQ(fault_of("1 2").expected, "expected an operator or the end of the expression");
@@ -202,13 +202,19 @@ TEST_F(ExpandedScene, RefusesIncludesInACircleOutsideItsFolderAndOfOtherFiles) {
   write("a.yaml", "include: b.yaml\n");
   write("b.yaml", "include: a.yaml\n");
   EXPECT_EQ(faults("include: a.yaml\nschema: 1\n")[0].expected, "expected files that do not include one another in a circle");
-  EXPECT_EQ(faults("include: ../other.yaml\nschema: 1\n")[0].expected, "expected a file in the scene's folder");
-  EXPECT_EQ(faults("include: /etc/passwd\nschema: 1\n")[0].expected, "expected a file in the scene's folder");
+  EXPECT_EQ(faults("include: ../other.yaml\nschema: 1\n")[0].expected, "expected a file inside the scene's folder");
+  EXPECT_EQ(faults("include: /etc/passwd\nschema: 1\n")[0].expected, "expected a file inside the scene's folder");
   EXPECT_EQ(faults("include: none.yaml\nschema: 1\n")[0].found, "nothing");
+  try {  // beside a scene that is named without a folder
+    (void)parse_scene("include: none.yaml\nschema: 1\n", "test.yaml", "");
+    ADD_FAILURE() << "no fault";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.faults()[0].found, "nothing");
+  }
   fs::create_symlink("/etc/passwd", folder_ / "link.yaml");
-  EXPECT_EQ(faults("include: link.yaml\nschema: 1\n")[0].expected, "expected a file in the scene's folder");
+  EXPECT_EQ(faults("include: link.yaml\nschema: 1\n")[0].expected, "expected a file inside the scene's folder");
   fs::create_directories(folder_ / "inner");
-  EXPECT_EQ(faults("include: inner\nschema: 1\n")[0].found, "no regular file");
+  EXPECT_EQ(faults("include: inner\nschema: 1\n")[0].found, "a folder");
   write("many.yaml", "duration: 1\n");
   std::string many = "schema: 1\ninclude: [many.yaml";
   for (int i = 0; i < 100; ++i) many += ", many.yaml";
@@ -228,6 +234,7 @@ TEST_F(ExpandedScene, RefusesWhatHasNoValue) {
   EXPECT_EQ(fault("x: 1 m", "${x}").key, "objects[0].particles.mass");
   EXPECT_EQ(fault("x: red", "${2*x}").found, "the text 'red'");
   EXPECT_EQ(fault("x: 1", "${y}").key, "objects[0].particles.mass");
+  EXPECT_NE(fault("width: 1", "${widht}").hint.find("did you mean 'width'?"), std::string::npos);
 }
 
 TEST_F(ExpandedScene, RefusesRepetitionsThatAreTooMany) {

@@ -17,21 +17,27 @@
 
 namespace supple::collision {
 
+/// Buffers of one squeezed region; reused.
+struct EnergyScratch {
+  std::vector<Vec3> point;
+  std::vector<double> weight;  ///< times the modulus [N m]
+  implicit::FieldParts rows;
+};
+
 /// Buffers of `linearise_contacts`; reused.
 struct LineariseScratch {
   std::vector<double> value;
   std::vector<Vec3> gradient_a, gradient_b;
   implicit::FieldParts parts_a, parts_b;
-  std::vector<Vec3> inner_point;       ///< of one squeezed region
-  std::vector<double> inner_weight;    ///< times the modulus [N m]
-  implicit::FieldParts inner_parts;
+  EnergyScratch energy;
   std::vector<Vec3> force, torque;     ///< of the parts of one body
   std::vector<double> share;
 };
 
+/// @param in  `settings.split` and the surface; friction acts by Coulomb's law without springs
 /// @param particles  of each body: the particle of each of its parts; empty for fixed bodies  @param out  replaced; its pairs are those of
 /// `surface.summary`, so that pairs without points are empty ones
-void linearise_contacts(std::span<const ContactBody> bodies, const ContactRules& rules, const ContactSurface& surface, SplitRule split,
-                        std::span<const std::span<const std::uint32_t>> particles, LineariseScratch& scratch, core::ContactPoints& out);
+void linearise_contacts(const ReactionInputs& in, std::span<const std::span<const std::uint32_t>> particles, LineariseScratch& scratch,
+                        core::ContactPoints& out);
 
 }  // namespace supple::collision

@@ -53,6 +53,7 @@ struct ReactionOutputs {
   std::span<PartLoads> dissipative{};            ///< the dissipative part of the same loads, sized like `loads`
   std::vector<Vec3>* traction_force = nullptr;   ///< replaced: the force on A of each pair, dissipative part included [N], shape [pairs]
   std::vector<double>* pair_power = nullptr;     ///< replaced: what damping and friction take of each pair [W], shape [pairs]
+  std::vector<double>* friction_speed = nullptr; ///< replaced: below which friction falls to zero [m/s], 0 without such friction, shape [pairs]
 };
 
 /// Adds to out.loads[i] what contact does to body i. Forces and moments of a pair sum to zero.
