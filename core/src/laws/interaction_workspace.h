@@ -61,6 +61,12 @@ struct PackedBonds {
   std::vector<LaneRow> numbers;
 };
 
+/// The neighbours in range of four particles, each column a list of its own that is filled up with fillers.
+struct NearColumns {
+  std::vector<std::uint32_t> entry;  ///< shape [steps][kLanes]
+  std::uint32_t steps = 0;
+};
+
 /// A geometric law and the lists of the particles it acts on.
 template <class Law>
 struct PackedGeometric {
@@ -68,6 +74,7 @@ struct PackedGeometric {
   double range = 0.0;
   std::array<double, PairKernel<Law>::kNumbers> numbers;
   PairLists lists;
+  std::vector<NearColumns> near;  ///< of each block of the lists, so that no thread needs one of its own
 };
 
 struct InteractionWorkspace::Impl {

@@ -346,38 +346,32 @@ class Owners {
   typename OwnNumbers<Kernel>::Type own_{};
 };
 
-/// The neighbours in range of four particles, each column a list of its own that is filled up with fillers.
-struct NearColumns {
-  std::vector<std::uint32_t> entry;  ///< shape [steps][kLanes]
-  std::uint32_t steps = 0;
-
-  template <class Law>
-  void take(const Owners<Law>& owners, Lanes range2, const std::uint32_t* j, std::uint32_t listed, std::uint32_t filler) {
-    if (entry.size() < kLanes * (listed + std::size_t{1})) entry.resize(2 * kLanes * (listed + std::size_t{1}));
-    std::array<std::uint32_t, kLanes> count{};
-    for (std::uint32_t s = 0; s < listed; ++s, j += kGroup) {
-      const unsigned near = bits_of(owners.near(range2, j));
-      for (std::uint32_t k = 0; k < kLanes; ++k) {
-        entry[kLanes * count[k] + k] = j[k];
-        count[k] += near >> k & 1U;
-      }
-    }
-    steps = *std::max_element(count.begin(), count.end());
+template <class Law>
+void take_near(const Owners<Law>& owners, Lanes range2, const std::uint32_t* j, std::uint32_t listed, std::uint32_t filler,
+               NearColumns& out) {
+  if (out.entry.size() < kLanes * (listed + std::size_t{1})) out.entry.resize(2 * kLanes * (listed + std::size_t{1}));
+  std::array<std::uint32_t, kLanes> count{};
+  for (std::uint32_t s = 0; s < listed; ++s, j += kGroup) {
+    const unsigned near = bits_of(owners.near(range2, j));
     for (std::uint32_t k = 0; k < kLanes; ++k) {
-      for (std::uint32_t s = count[k]; s < steps; ++s) entry[kLanes * s + k] = filler;
+      out.entry[kLanes * count[k] + k] = j[k];
+      count[k] += near >> k & 1U;
     }
   }
-};
+  out.steps = *std::max_element(count.begin(), count.end());
+  for (std::uint32_t k = 0; k < kLanes; ++k) {
+    for (std::uint32_t s = count[k]; s < out.steps; ++s) out.entry[kLanes * s + k] = filler;
+  }
+}
 
 /// @return pairs in range, each counted from both sides
 template <class Law>
-std::uint64_t accumulate_block(const PackedGeometric<Law>& law, const PairLists::Block& block, const StagedPoses& pose,
-                               std::vector<StagedLoads>& sum) {
+std::uint64_t accumulate_block(const PackedGeometric<Law>& law, const PairLists::Block& block, NearColumns& near,
+                               const StagedPoses& pose, std::vector<StagedLoads>& sum) {
   std::array<Lanes, PairKernel<Law>::kNumbers> numbers;
   for (std::size_t n = 0; n < numbers.size(); ++n) numbers[n] = Lanes(law.numbers[n]);
   const Lanes range2(law.range * law.range);
   const auto filler = static_cast<std::uint32_t>(sum.size() - kFillers);
-  thread_local NearColumns near;
   std::uint64_t present = 0;
   for (const PairGroup& group : block.group) {
     for (std::size_t first = 0; first < group.owners; first += kLanes) {
@@ -388,7 +382,7 @@ std::uint64_t accumulate_block(const PackedGeometric<Law>& law, const PairLists:
       std::size_t stride = kGroup;
       if constexpr (PairKernel<Law>::kTorque) {
         // Laws that take longer than the search for what is in range.
-        near.take(owners, range2, j, group.steps, filler);
+        take_near(owners, range2, j, group.steps, filler, near);
         j = near.entry.data();
         steps = near.steps;
         stride = kLanes;
@@ -408,8 +402,11 @@ void accumulate_geometric(PackedGeometric<Law>& law, const ParticleState& state,
   counts.pairs_visited += law.lists.update(state.position, executor);
   const std::span<const PairLists::Block> blocks = law.lists.blocks();
   work.present.assign(blocks.size(), 0);
+  if (law.near.size() < blocks.size()) law.near.resize(blocks.size());
   const auto body = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) work.present[b] = accumulate_block(law, blocks[b], work.pose, work.sum);
+    for (std::size_t b = begin; b < end; ++b) {
+      work.present[b] = accumulate_block(law, blocks[b], law.near[b], work.pose, work.sum);
+    }
   };
   executor.for_blocks(blocks.size(), 1, std::cref(body));
   std::uint64_t listed = 0, present = 0;
@@ -464,7 +461,8 @@ PackedGeometric<Law> pack_geometric(const GeometricLaw<Law>& law, const Particle
   }
   PackedGeometric<Law> out{.range = law.range,
                            .numbers = {},
-                           .lists = PairLists(law.range, particle, static_cast<std::uint32_t>(set.size()), takes)};
+                           .lists = PairLists(law.range, particle, static_cast<std::uint32_t>(set.size()), takes),
+                           .near = {}};
   PairKernel<Law>::pack(law.law, out.numbers.data());
   return out;
 }

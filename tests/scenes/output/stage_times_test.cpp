@@ -40,5 +40,16 @@ TEST(StageTimes, AddUpToTheWholeWithinAQuarterWhereSomeStepsStandForAll) {
   EXPECT_GT(advance, 0.0);
 }
 
+// A hand that closes spends most of its time on samples and contacts; a stage that is not measured would leave its time to `advance`.
+TEST(StageTimes, BelongToTheStagesThatTakeThem) {
+  for (const bool every_step : {true, false}) {
+    Simulation simulation(library_scene("objects/hand_closes", {"output={}", "duration=0.1 s"}), {.profile = every_step});
+    run(simulation, simulation.scene().frame_count());
+    const Profile stages = simulation.profile();
+    const auto of = [&](Stage stage) { return stages[static_cast<std::size_t>(stage)].cpu_s; };
+    EXPECT_GT(of(Stage::SampleSurface) + of(Stage::FindContacts) + of(Stage::SolveContactSurface), 2.0 * of(Stage::Integrate)) << every_step;
+  }
+}
+
 }  // namespace
 }  // namespace supple::scenes
