@@ -1,5 +1,5 @@
 supple_together(
-  "src/field/blend.cpp src/mesh/blob_grid.cpp src/bounds/claim_bounds.cpp src/skeleton/convolution.cpp src/mesh/creases/crease_points.cpp
+  "src/field/blend.cpp src/mesh/blob_grid.cpp src/bounds/weighted_bounds.cpp src/skeleton/convolution.cpp src/mesh/creases/crease_points.cpp
    src/mesh/delaunay/delaunay_estimate.cpp"
   "src/solids/closed_surface.cpp src/mesh/creases/crease_nodes.cpp src/mesh/creases/creases.cpp src/samples/even_samples.cpp src/solids/half_space.cpp
    src/mesh/cubes/march_cubes.cpp"

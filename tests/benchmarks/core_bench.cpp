@@ -107,7 +107,8 @@ class Forces {
   const Loads& at(const ParticleSet& set, const ParticleState& state, const Executor& executor) {
     loads_.reset(set.size());
     external_.reset(set.size());
-    counts = accumulate_interactions(set, state, all_, 0.0, executor, workspace_, loads_, external_);
+    counts = accumulate_interactions(set, state, all_, executor, workspace_, loads_);
+    add_external_loads(set, all_, 0.0, external_);
     return loads_;
   }
   InteractionCounts counts;
@@ -422,7 +423,8 @@ class Spiral {
   }
   void run() {
     const ForceModel forces = [&](const ParticleState& at, double time, ForceSample& out) {
-      accumulate_interactions(rest_.set, at, all_, time, executor_, *workspace_, out.internal, out.external);
+      accumulate_interactions(rest_.set, at, all_, executor_, *workspace_, out.internal);
+      add_external_loads(rest_.set, all_, time, out.external);
     };
     state = rest_.state;
     kick_.valid = false;

@@ -122,7 +122,8 @@ Run run(System s, double mass_ratio, double compression, double factor) {
   const Executor executor(1);
   InteractionWorkspace workspace(s.p.set, s.laws);
   const ForceModel forces = [&](const ParticleState& state, double time, ForceSample& out) {
-    accumulate_interactions(s.p.set, state, s.laws, time, executor, workspace, out.internal, out.external);
+    accumulate_interactions(s.p.set, state, s.laws, executor, workspace, out.internal);
+    add_external_loads(s.p.set, s.laws, time, out.external);
   };
   KickState kick;
   Ledger ledger;

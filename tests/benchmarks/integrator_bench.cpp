@@ -92,7 +92,8 @@ Result run(System s, const IntegratorSettings& settings, double dt) {
   InteractionWorkspace pairs(s.p.set, s.laws);
   IntegratorWorkspace workspace;
   const ForceModel forces = [&](const ParticleState& state, double time, ForceSample& out) {
-    accumulate_interactions(s.p.set, state, s.laws, time, executor, pairs, out.internal, out.external);
+    accumulate_interactions(s.p.set, state, s.laws, executor, pairs, out.internal);
+    add_external_loads(s.p.set, s.laws, time, out.external);
   };
   KickState kick;
   Ledger ledger;

@@ -37,7 +37,8 @@ double tip_deflection(int bonds, double force, double shear_stiffness) {
   const Executor executor(1);
   InteractionWorkspace pairs(p.set, interactions);
   const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-    accumulate_interactions(p.set, state, interactions, t, executor, pairs, out.internal, out.external);
+    accumulate_interactions(p.set, state, interactions, executor, pairs, out.internal);
+    add_external_loads(p.set, interactions, t, out.external);
   };
   const IntegratorSettings settings{.method = Integrator::BackwardEuler, .tolerance = 1e-12};
   IntegratorWorkspace workspace;
@@ -117,7 +118,8 @@ TEST(FreeSpiral, KeepsItsEnergyOverAMillionSteps) {
   const Executor executor(1);
   InteractionWorkspace pairs(p.set, interactions);
   const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-    accumulate_interactions(p.set, state, interactions, t, executor, pairs, out.internal, out.external);
+    accumulate_interactions(p.set, state, interactions, executor, pairs, out.internal);
+    add_external_loads(p.set, interactions, t, out.external);
   };
   KickState kick;
   Ledger ledger;

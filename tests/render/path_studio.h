@@ -33,7 +33,7 @@ struct Studio {
     settings.focus = view.camera.focus > 0.0 ? view.camera.focus : (view.camera.from - view.camera.look_at).norm();
     settings.aperture = view.camera.aperture;
     path::Film film;
-    path::trace(geometry, lights, ground, camera_matrices(view.camera, 1.0 * settings.width / settings.height, {}), settings,
+    path::trace({geometry, lights, ground, camera_matrices(view.camera, 1.0 * settings.width / settings.height, {})}, settings,
                 Executor(threads), film);
     return film;
   }

@@ -27,7 +27,7 @@ struct FoundBulge {
   double held = 0.0;    ///< volume of the bulge [m^3]
 };
 
-/// What of a claim is the same whatever its heights.
+/// What of a deformed pressure is the same whatever its heights.
 struct BulgingBody {
   std::span<const ContactBody> bodies;
   std::uint32_t body = 0;

@@ -199,7 +199,7 @@ void add_literal(const ContactBody& body, BulgeProfile h, double highest, std::s
 
 }  // namespace
 
-ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
+DeformedPressure::DeformedPressure(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
                        const BulgeSettings& settings)
     : bodies_(bodies), body_(body), literal_(settings.literal) {
   SUPPLE_EXPECTS(body < bodies.size());
@@ -239,7 +239,7 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
       width = std::min(width, 0.9 * depth_outside(b));
       double height = std::min(settings.attenuation * s.largest_pressure, highest_);
       width = effective_width(width, height, 1.0);
-      // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3.
+      // h(x) <= x, and so no point belongs to two bulges, iff a0 <= w / 3.
       height = std::min(height, width / 3.0);
       if (!(height > 0.0)) continue;
       neighbours_.push_back({other, {.stiffness = 1.0, .height = height, .width = width}});
@@ -257,7 +257,7 @@ ClaimField::ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, 
   find_limiting();
 }
 
-void ClaimField::find_limiting() {
+void DeformedPressure::find_limiting() {
   limiting_.clear();
   for (std::uint32_t j = 0; j < bodies_.size(); ++j) {
     if (j == body_ || bodies_[j].material.modulus * bodies_[j].field.bound(box_).upper < -rise_) continue;
@@ -265,7 +265,7 @@ void ClaimField::find_limiting() {
   }
 }
 
-void ClaimField::want_volume(const ContactSurface& surface, std::size_t contact, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const {
+void DeformedPressure::want_volume(const ContactSurface& surface, std::size_t contact, std::uint32_t other, double width, std::vector<WantedBulge>& wanted) const {
   const ContactSurface::Summary& s = surface.summary[contact];
   const double displaced = s.bodies.a == body_ ? s.displaced_a : s.displaced_b;
   const SigmaSlopes slopes = slopes_on(surface, contact, bodies_[body_], bodies_[other]);
@@ -274,7 +274,7 @@ void ClaimField::want_volume(const ContactSurface& surface, std::size_t contact,
   // times the ratio of slopes is 1. With k = 1 / ratio that is half as much for w = 6 a0 / k.
   const double ratio = std::max(1.0, slopes.other / slopes.own), stiffness = 1.0 / ratio;
   width = std::min(width * slopes.other, 0.9 * depth_outside(bodies_[other]));
-  // h(x) <= x, and so no two claims to one point, iff a0 <= w / 3; no tongue, too, iff 3 a0 / w <= 1 / ratio. Together they stay below half of what
+  // h(x) <= x, and so no point belongs to two bulges, iff a0 <= w / 3; no tongue, too, iff 3 a0 / w <= 1 / ratio. Together they stay below half of what
   // would fill the space around.
   const double size = bodies_[body_].field.feature_size();
   const double filling = 0.5 * depth_outside(bodies_[body_]);
@@ -290,7 +290,7 @@ void ClaimField::want_volume(const ContactSurface& surface, std::size_t contact,
                     .centre = s.centre_of_pressure});
 }
 
-void ClaimField::keep_volumes(std::span<const WantedBulge> wanted) {
+void DeformedPressure::keep_volumes(std::span<const WantedBulge> wanted) {
   if (wanted.empty()) return;
   for (const WantedBulge& w : wanted) rise_ += w.highest;
   together_ = 0.5 * depth_outside(bodies_[body_]);
@@ -313,7 +313,7 @@ void ClaimField::keep_volumes(std::span<const WantedBulge> wanted) {
   rise_ = std::min(rise_, together_);
 }
 
-double ClaimField::literal_rise(const Neighbour& neighbour, const Box& box) const {
+double DeformedPressure::literal_rise(const Neighbour& neighbour, const Box& box) const {
   // h = k x (1 - 2 u)^2 + a0 (12 u^2 - 16 u^3) up to u = x / w = 1/2; the first is 2 k w / 27 at most, the second a0, as is all beyond.
   const ContactBody& other = bodies_[neighbour.body];
   const double width = (1.0 + 1e-9) * neighbour.profile.width;
@@ -323,7 +323,7 @@ double ClaimField::literal_rise(const Neighbour& neighbour, const Box& box) cons
   return std::min(highest_, 2.0 / 27.0 * steepness * width + neighbour.profile.height);
 }
 
-void ClaimField::evaluate_claims(std::span<const Vec3> points, std::span<double> values,
+void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<double> values,
                                  std::span<Vec3> gradients) const {
   const bool with_gradients = !gradients.empty();
   const std::size_t n = points.size();
@@ -388,17 +388,17 @@ void ClaimField::evaluate_claims(std::span<const Vec3> points, std::span<double>
   }
 }
 
-void ClaimField::evaluate(std::span<const Vec3> points, std::span<double> values) const {
+void DeformedPressure::evaluate(std::span<const Vec3> points, std::span<double> values) const {
   SUPPLE_EXPECTS(points.size() == values.size());
-  evaluate_claims(points, values, {});
+  evaluate_at(points, values, {});
 }
 
-void ClaimField::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
+void DeformedPressure::evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
   SUPPLE_EXPECTS(points.size() == values.size() && points.size() == gradients.size());
-  evaluate_claims(points, values, gradients);
+  evaluate_at(points, values, gradients);
 }
 
-void ClaimField::evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const {
+void DeformedPressure::evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const {
   const ContactBody& own = bodies_[body_];
   own.field.evaluate_parts(points, parts);
   for (double& v : parts.value) v *= own.material.modulus;
@@ -406,26 +406,26 @@ void ClaimField::evaluate_parts(std::span<const Vec3> points, implicit::FieldPar
   for (Vec3& g : parts.by_turn) g *= own.material.modulus;
 }
 
-Interval ClaimField::bound(const Box& box) const {
+Interval DeformedPressure::bound(const Box& box) const {
   const ContactBody& own = bodies_[body_];
-  Interval claim = own.field.bound(box);
-  claim.lower *= own.material.modulus;
-  claim.upper *= own.material.modulus;
+  Interval pressure = own.field.bound(box);
+  pressure.lower *= own.material.modulus;
+  pressure.upper *= own.material.modulus;
   for (const Neighbour& neighbour : neighbours_) {
     if (literal_) {
-      claim.upper += literal_rise(neighbour, box);
+      pressure.upper += literal_rise(neighbour, box);
       continue;
     }
     const ContactBody& other = bodies_[neighbour.body];
     const Interval p = other.field.bound(box);
     if (p.lower >= 0.0 || other.material.modulus * p.upper <= -neighbour.profile.width) continue;
     // h <= min(a0, x)
-    claim.upper += std::min(neighbour.profile.height, -other.material.modulus * p.lower);
+    pressure.upper += std::min(neighbour.profile.height, -other.material.modulus * p.lower);
   }
-  return claim;
+  return pressure;
 }
 
-double ClaimField::gradient_bound(const Box& box) const {
+double DeformedPressure::gradient_bound(const Box& box) const {
   const auto steepness = [&](const ContactBody& body) { return body.material.modulus * body.field.gradient_bound(box); };
   double bulge = 0.0;  // |h'| <= 1
   for (const Neighbour& neighbour : neighbours_) {
@@ -442,7 +442,7 @@ double ClaimField::gradient_bound(const Box& box) const {
   return steepness(bodies_[body_]) + bulge;
 }
 
-void ClaimField::add_content(const std::function<std::uint64_t(std::uint32_t)>& field, ContentWords& words) const {
+void DeformedPressure::add_content(const std::function<std::uint64_t(std::uint32_t)>& field, ContentWords& words) const {
   const auto add_body = [&](std::uint32_t body) {
     words.add(field(body));
     words.add(bodies_[body].material.modulus);
@@ -463,15 +463,15 @@ void ClaimField::add_content(const std::function<std::uint64_t(std::uint32_t)>& 
   words.add(box_.upper);
 }
 
-Box ClaimField::surface_box() const { return box_; }
-double ClaimField::feature_size() const { return bodies_[body_].field.feature_size(); }
+Box DeformedPressure::surface_box() const { return box_; }
+double DeformedPressure::feature_size() const { return bodies_[body_].field.feature_size(); }
 
 DeformedField::DeformedField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
                              const BulgeSettings& settings)
     : own_(bodies, body, surface, settings), modulus_(bodies[body].material.modulus) {
   for (std::uint32_t j = 0; j < bodies.size(); ++j) {
     if (j == body) continue;
-    ClaimField other(bodies, j, surface, settings);
+    DeformedPressure other(bodies, j, surface, settings);
     if (other.surface_box().overlaps(own_.surface_box())) others_.push_back(std::move(other));
   }
 }
@@ -482,8 +482,8 @@ void DeformedField::evaluate(std::span<const Vec3> points, std::span<double> val
   own_.evaluate(points, values);
   largest.assign(points.size(), 0.0);
   other.resize(points.size());
-  for (const ClaimField& claim : others_) {
-    claim.evaluate(points, other);
+  for (const DeformedPressure& pressure : others_) {
+    pressure.evaluate(points, other);
     for (std::size_t i = 0; i < points.size(); ++i) largest[i] = std::max(largest[i], other[i]);
   }
   for (std::size_t i = 0; i < points.size(); ++i) values[i] = (values[i] - largest[i]) / modulus_;
@@ -499,8 +499,8 @@ void DeformedField::evaluate(std::span<const Vec3> points, std::span<double> val
   largest_slope.assign(points.size(), Vec3::Zero());
   other.resize(points.size());
   slope.resize(points.size());
-  for (const ClaimField& claim : others_) {
-    claim.evaluate(points, other, slope);
+  for (const DeformedPressure& pressure : others_) {
+    pressure.evaluate(points, other, slope);
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (other[i] <= largest[i]) continue;
       largest[i] = other[i];
@@ -523,8 +523,8 @@ void DeformedField::evaluate_parts(std::span<const Vec3> points, implicit::Field
 Interval DeformedField::bound(const Box& box) const {
   Interval sum = own_.bound(box);
   Interval taken{0.0, 0.0};
-  for (const ClaimField& claim : others_) {
-    const Interval other = claim.bound(box);
+  for (const DeformedPressure& pressure : others_) {
+    const Interval other = pressure.bound(box);
     taken.lower = std::max(taken.lower, other.lower);
     taken.upper = std::max(taken.upper, other.upper);
   }
@@ -533,7 +533,7 @@ Interval DeformedField::bound(const Box& box) const {
 
 double DeformedField::gradient_bound(const Box& box) const {
   double other = 0.0;
-  for (const ClaimField& claim : others_) other = std::max(other, claim.gradient_bound(box));
+  for (const DeformedPressure& pressure : others_) other = std::max(other, pressure.gradient_bound(box));
   return (own_.gradient_bound(box) + other) / modulus_;
 }
 
@@ -560,8 +560,8 @@ void DeformedDepth::evaluate(std::span<const Vec3> points, std::span<double> val
     if (steepness > 0.0) gradients[i] = gradient / steepness;
   };
   for (std::size_t i = 0; i < n; ++i) take(i, own[i], slope[i]);
-  for (const ClaimField& claim : others_) {
-    claim.evaluate(points, other, other_slope);
+  for (const DeformedPressure& pressure : others_) {
+    pressure.evaluate(points, other, other_slope);
     for (std::size_t i = 0; i < n; ++i) take(i, own[i] - other[i], slope[i] - other_slope[i]);
   }
 }
@@ -575,9 +575,9 @@ Interval DeformedDepth::bound(const Box& box) const {
     if (value.upper < 0.0) depth.upper = std::min(depth.upper, value.upper / steepest);
   };
   take(own, own_slope);
-  for (const ClaimField& claim : others_) {
-    const Interval other = claim.bound(box);
-    take({own.lower - other.upper, own.upper - other.lower}, own_slope + claim.gradient_bound(box));
+  for (const DeformedPressure& pressure : others_) {
+    const Interval other = pressure.bound(box);
+    take({own.lower - other.upper, own.upper - other.lower}, own_slope + pressure.gradient_bound(box));
   }
   return depth;
 }

@@ -40,8 +40,7 @@ class StepPotential {
   void differentiate(const ParticleState& pose) {
     const std::size_t n = set_.size();
     buffers_.laws.reset(n);
-    buffers_.unused.reset(n);
-    accumulate_interactions(set_, pose, interactions_, 0.0, executor_, pairs_, buffers_.laws, buffers_.unused);
+    accumulate_interactions(set_, pose, interactions_, executor_, pairs_, buffers_.laws);
     buffers_.gradient.setZero(static_cast<Eigen::Index>(6 * n));
     for (std::size_t i = 0; i < n; ++i) {
       const auto row = static_cast<Eigen::Index>(6 * i);
@@ -254,13 +253,11 @@ void fly(const ParticleSet& set, const ParticleState& state, const Loads& frozen
 }
 
 /// Loads outside the pair laws, at the pose of `at` and the time `time`; external loads are kept in `buffers.sample`.
-void freeze(const ParticleSet& set, const Interactions& interactions, const ForceModel& forces, double time,
-            const ParticleState& at, const Executor& executor, InteractionWorkspace& pairs, ImplicitBuffers& buffers) {
-  const std::size_t n = set.size();
-  evaluate(forces, at, time, buffers.sample);
+void freeze(const StepProblem& problem, double time, const ParticleState& at, const StepTools& tools, ImplicitBuffers& buffers) {
+  const std::size_t n = problem.set.size();
+  evaluate(problem.forces, at, time, buffers.sample);
   buffers.laws.reset(n);
-  buffers.unused.reset(n);
-  accumulate_interactions(set, at, interactions, time, executor, pairs, buffers.laws, buffers.unused);
+  accumulate_interactions(problem.set, at, problem.interactions, tools.executor, tools.pairs, buffers.laws);
   buffers.frozen.reset(n);
   const ForceSample& sample = buffers.sample;
   for (std::size_t i = 0; i < n; ++i) {
@@ -308,8 +305,9 @@ void book_external_work(const ParticleSet& set, const ParticleState& start, cons
 
 }  // namespace
 
-StepReport advance_implicit(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+StepReport advance_implicit(const IntegratorSettings& settings, const StepProblem& problem, const StepSpan& span,
                             const StepTarget& target, const StepTools& tools, ImplicitBuffers& buffers) {
+  const auto [time, dt] = span;
   const ParticleSet& set = problem.set;
   const Interactions& interactions = problem.interactions;
   ParticleState& state = target.state;
@@ -329,9 +327,9 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   if (midpoint) {
     buffers.frozen.reset(n);
     fly(set, state, buffers.frozen, h, buffers.pose);
-    freeze(set, interactions, problem.forces, time + h, buffers.pose, tools.executor, tools.pairs, buffers);
+    freeze(problem, time + h, buffers.pose, tools, buffers);
   } else {
-    freeze(set, interactions, problem.forces, time + h, state, tools.executor, tools.pairs, buffers);
+    freeze(problem, time + h, state, tools, buffers);
   }
   fly(set, state, buffers.frozen, h, buffers.flight);
 

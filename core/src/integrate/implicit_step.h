@@ -13,7 +13,6 @@ namespace supple::core {
 struct ImplicitBuffers {
   ForceSample sample;
   Loads laws;       ///< of the pair laws; at the end of contact, too
-  Loads unused;     ///< external loads that the pair laws come with
   Loads frozen;     ///< all loads outside the pair laws
   ParticleState flight;  ///< after free flight under the frozen loads
   ParticleState start;   ///< after the first half of the damping
@@ -29,7 +28,12 @@ struct ImplicitBuffers {
   Eigen::VectorXd correction;
 };
 
-StepReport advance_implicit(const IntegratorSettings& settings, const StepProblem& problem, double time, double dt,
+/// The start and the length of a step [s].
+struct StepSpan {
+  double time, dt;
+};
+
+StepReport advance_implicit(const IntegratorSettings& settings, const StepProblem& problem, const StepSpan& span,
                             const StepTarget& target, const StepTools& tools, ImplicitBuffers& buffers);
 
 }  // namespace supple::core

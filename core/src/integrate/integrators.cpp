@@ -29,7 +29,7 @@ StepReport advance(const IntegratorSettings& settings, const StepProblem& proble
     }
     case Integrator::BackwardEuler:
     case Integrator::ImplicitMidpoint:
-      return advance_implicit(settings, problem, time, dt, target, tools, tools.workspace.impl().implicit);
+      return advance_implicit(settings, problem, {time, dt}, target, tools, tools.workspace.impl().implicit);
     case Integrator::RungeKutta4:
     case Integrator::Adaptive: break;
   }

@@ -35,10 +35,18 @@ Rotation<T> load_orientation(const Work& work, std::size_t at) {
   return {load_rows<T>(work, kOrientation, at), T::load_any(work.row(kOrientation + 3) + at)};
 }
 
-/// The bonds (a + k, b + k) of some lanes. @param numbers  of the law, at these lanes
+/// The bonds (a + k, b + k) of some lanes.
+template <class T>
+struct BondLanes {
+  const Work& work;
+  std::size_t a, b;
+  const Vector<T>& r;
+  const double* numbers;  ///< of a law
+};
+
 template <class Law, class T>
-void add_law(const Work& work, std::size_t a, std::size_t b, const double* numbers, const Vector<T>& r,
-             KernelLoads<T>& sum) {
+void add_law(const BondLanes<T>& bond, KernelLoads<T>& sum) {
+  const auto& [work, a, b, r, numbers] = bond;
   using Kernel = PairKernel<Law>;
   std::array<T, Kernel::kNumbers> p;
   for (std::size_t k = 0; k < Kernel::kNumbers; ++k) p[k] = T::load(numbers + k * kBatch);
@@ -60,10 +68,9 @@ void add_law(const Work& work, std::size_t a, std::size_t b, const double* numbe
 }
 
 template <class T, std::size_t... I>
-void add_law_at(std::uint32_t law, const Work& work, std::size_t a, std::size_t b, const double* numbers,
-                const Vector<T>& r, KernelLoads<T>& sum, std::index_sequence<I...>) {
+void add_law_at(std::uint32_t law, const BondLanes<T>& bond, KernelLoads<T>& sum, std::index_sequence<I...>) {
   const auto add_if = [&]<std::size_t k>(std::integral_constant<std::size_t, k>) {
-    if (law == k) add_law<std::tuple_element_t<k, Laws>>(work, a, b, numbers, r, sum);
+    if (law == k) add_law<std::tuple_element_t<k, Laws>>(bond, sum);
   };
   (add_if(std::integral_constant<std::size_t, I>{}), ...);
 }
@@ -78,7 +85,7 @@ KernelLoads<T> batch_loads(const Group& group, std::size_t index, std::size_t pa
   KernelLoads<T> sum{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
   for (const GroupLaw& law : group.laws) {
     const double* const numbers = work.numbers[law.begin + index * law.numbers].value.data() + part;
-    add_law_at(law.law, work, a, b, numbers, r, sum, std::make_index_sequence<std::tuple_size_v<Laws>>{});
+    add_law_at(law.law, BondLanes<T>{work, a, b, r, numbers}, sum, std::make_index_sequence<std::tuple_size_v<Laws>>{});
   }
   return sum;
 }

@@ -605,10 +605,10 @@ InteractionWorkspace::InteractionWorkspace(InteractionWorkspace&&) noexcept = de
 InteractionWorkspace& InteractionWorkspace::operator=(InteractionWorkspace&&) noexcept = default;
 
 InteractionCounts accumulate_interactions(const ParticleSet& set, const ParticleState& state,
-                                          const Interactions& interactions, double time, const Executor& executor,
-                                          InteractionWorkspace& workspace, Loads& internal, Loads& external) {
+                                          const Interactions& interactions, const Executor& executor,
+                                          InteractionWorkspace& workspace, Loads& loads) {
   const std::size_t n = set.size();
-  SUPPLE_EXPECTS(state.size() == n && internal.force.size() == n && external.force.size() == n);
+  SUPPLE_EXPECTS(state.size() == n && loads.force.size() == n);
   InteractionWorkspace::Impl& work = workspace.impl();
   SUPPLE_EXPECTS(work.gather_start.size() == n + 1);
   InteractionCounts counts{.pairs_visited = work.law_bonds, .pairs_present = work.law_bonds};
@@ -625,19 +625,22 @@ InteractionCounts accumulate_interactions(const ParticleSet& set, const Particle
   };
   std::apply([&](auto&... lists) { (accumulate_lists(lists), ...); }, work.geometric);
   for (const BondedLaw<LiteralForm>& list : interactions.literal_form) {
-    accumulate_literal_form(list, set, state, internal);
+    accumulate_literal_form(list, set, state, loads);
     counts.pairs_visited += list.law.size();
     counts.pairs_present += list.law.size();
   }
-  unstage_loads(executor, work, internal);
+  unstage_loads(executor, work, loads);
+  return counts;
+}
 
+void add_external_loads(const ParticleSet& set, const Interactions& interactions, double time, Loads& external) {
+  SUPPLE_EXPECTS(external.force.size() == set.size());
   const auto [from, to] = interactions.load_span;
   if (from < to) {
     add_external(set, interactions, from, to, external);
   } else {
     add_external(set, interactions, time, time, external);
   }
-  return counts;
 }
 
 void external_loads(const ParticleSet& set, const Interactions& interactions, double from, double to, Loads& external) {

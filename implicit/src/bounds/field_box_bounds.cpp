@@ -201,10 +201,17 @@ double least_of_hull(std::span<const GradientBounds::Ball> hull) {
   return std::max(least, 0.0);
 }
 
-/// Balls of gradients that F may have, from those of the nodes [1/m].
-/// @param reach  from the centre of the box to its corners  @param largest  half its largest edge
-void find_hull(const BlendIndex& blend, std::span<const Expansion> nodes, std::span<const BlendIndex::NodeBound> bounds,
-               std::span<const BlendIndex::Term> terms, double reach, double largest, std::vector<GradientBounds::Ball>& hull) {
+/// The nodes of a blend near a box, with bounds and the terms that their blend may have.
+struct BoxNodes {
+  std::span<const Expansion> nodes;
+  std::span<const BlendIndex::NodeBound> bounds;
+  std::span<const BlendIndex::Term> terms;
+};
+
+/// Balls of gradients that F may have in a box, from those of the nodes [1/m]. @param half  the box's extent, halved
+void find_hull(const BlendIndex& blend, const BoxNodes& of, const Vec3& half, std::vector<GradientBounds::Ball>& hull) {
+  const auto& [nodes, bounds, terms] = of;
+  const double reach = half.norm(), largest = half.maxCoeff();
   using Ball = GradientBounds::Ball;
   const auto ball = [&](std::size_t k) { return Ball{nodes[k].gradient, nodes[k].turn(reach) + nodes[k].round_off() / largest}; };
   hull.clear();
@@ -272,7 +279,7 @@ GradientBounds blended_box_bounds(const Field::Index& index, const Box& box, con
                       .second_order = true}, {}, {}};
   if (index.blend.rule() != BlendRule::Ricci && !index.blend.find_terms(bounds, terms)) return {{.value = out.value}, {}, {}};
   if (!sloped || half.isZero()) return out;
-  find_hull(index.blend, nodes, bounds, terms, half.norm(), half.maxCoeff(), out.hull);
+  find_hull(index.blend, {nodes, bounds, terms}, half, out.hull);
   for (GradientBounds::Ball& ball : out.hull) ball.turn += round_off * slopes;
   out.round_off = round_off * scale;
   out.least_slope = least_of_hull(out.hull);

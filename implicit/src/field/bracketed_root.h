@@ -5,9 +5,13 @@
 
 namespace supple::implicit {
 
-/// Root of F on a + t along between t = low and t = high, whose values have opposite signs; returns t. Newton kept in
-/// its bracket, and bisection whenever a step is not half of the one before.
-[[nodiscard]] double bracketed_root(const FieldView& field, const Vec3& a, const Vec3& along, double low, double f_low, double high,
-                                    double f_high);
+/// Ends of a part of a line and F there, of opposite signs.
+struct Bracket {
+  double low, f_low, high, f_high;
+};
+
+/// Root of F on a + t along in the bracket; returns t. Newton kept in its bracket, and bisection whenever a step is not half of
+/// the one before.
+[[nodiscard]] double bracketed_root(const FieldView& field, const Vec3& a, const Vec3& along, const Bracket& bracket);
 
 }  // namespace supple::implicit

@@ -44,20 +44,28 @@ void gather(const BlendIndex& blend, const FieldParts& parts, std::size_t i, std
   }
 }
 
+/// The point x, in row i of the parts, and the sums of the nodes there.
+struct BlendPoint {
+  std::span<const NodeSample> nodes;
+  const FieldParts& parts;
+  std::size_t i;
+  const Vec3& x;
+};
+
 /// Calls use(row, added, along) for the parts of the winning pair: what the change of the angle between their gradients adds to
 /// the gradient, split by the part whose second derivatives cause it, and dF / d(grad f) of their nodes [m].
 template <class Use>
-void for_turning(const Field::Index& index, const Combined& combined, std::span<const NodeSample> nodes, const FieldParts& parts,
-                 std::size_t i, const Vec3& x, const Use& use) {
-  const NodeSample* pair[2] = {&nodes[combined.first], &nodes[combined.second]};
+void for_turning(const Field::Index& index, const Combined& combined, const BlendPoint& at, const Use& use) {
+  const FieldParts& parts = at.parts;
+  const NodeSample* pair[2] = {&at.nodes[combined.first], &at.nodes[combined.second]};
   for (std::size_t side = 0; side < 2; ++side) {
     const NodeSample& own = *pair[side];
     const NodeSample& other = *pair[1 - side];
     const double length = own.gradient.norm();
     const Vec3 turn = other.gradient.normalized() - combined.cosine / length * own.gradient;
     const Vec3 along = combined.by_cosine / length * turn;
-    for (std::uint32_t r = parts.offset[i]; r < parts.offset[i + 1]; ++r) {
-      if (index.blend.node_of(parts.part[r]) == own.node) use(r, part_hessian(index, parts.part[r], x) * along, along);
+    for (std::uint32_t r = parts.offset[at.i]; r < parts.offset[at.i + 1]; ++r) {
+      if (index.blend.node_of(parts.part[r]) == own.node) use(r, part_hessian(index, parts.part[r], at.x) * along, along);
     }
   }
 }
@@ -79,7 +87,7 @@ void evaluate_blended(const Field::Index& index, std::span<const Vec3> points, d
       gradient.setZero();
       for (std::size_t k = 0; k < scratch.nodes.size(); ++k) gradient += scratch.share[k] * scratch.nodes[k].gradient;
       if (combined.by_cosine == 0.0) continue;
-      for_turning(index, combined, scratch.nodes, scratch.parts, i, chunk[i],
+      for_turning(index, combined, {scratch.nodes, scratch.parts, i, chunk[i]},
                   [&](std::uint32_t, const Vec3& added, const Vec3&) { gradient += added; });
     }
   }
@@ -108,7 +116,7 @@ void blended_part_rows(const Field::Index& index, std::span<const Vec3> points, 
       parts.gradient[r] *= share;
     }
     if (combined.by_cosine != 0.0) {
-      for_turning(index, combined, scratch.nodes, parts, i, points[i], [&](std::uint32_t r, const Vec3& added, const Vec3& along) {
+      for_turning(index, combined, {scratch.nodes, parts, i, points[i]}, [&](std::uint32_t r, const Vec3& added, const Vec3& along) {
         parts.gradient[r] += added;
         parts.by_turn[r] = scratch.own[r - row_begin].cross(along);
       });

@@ -37,9 +37,16 @@ PackedKind kind_of(const Primitive& p) noexcept {
   return wyvill ? PackedKind::SlabWyvill : PackedKind::SlabGascuel;
 }
 
+/// A primitive as the kernels of the index take it.
+struct PackedRow {
+  PackedPrimitive& packed;
+  PackedShape& shape;
+  RoundedBox& rounded;
+};
+
 /// @param control  where the primitive's control points have been copied to
-void pack(const Primitive& p, const Vec3* control, const Vec3& position, const Mat3& rotation, PackedPrimitive& packed,
-          PackedShape& shape, RoundedBox& rounded) noexcept {
+void pack(const Primitive& p, const Vec3* control, const Vec3& position, const Mat3& rotation, const PackedRow& row) noexcept {
+  auto& [packed, shape, rounded] = row;
   const double R = p.kernel.radius;
   packed.position = {position.x(), position.y(), position.z()};
   packed.inverse_r2 = 1.0 / (R * R);
@@ -130,7 +137,7 @@ void Field::Index::pack_balls() {
     if (ball.kernel.radius != ball_radius[i]) ball.kernel = Kernel::wyvill(ball_radius[i]);
     const Vec3 position(primitive[i].position[0], primitive[i].position[1], primitive[i].position[2]);
     PackedPrimitive same;
-    pack(ball, nullptr, position, Mat3::Identity(), same, shape[i], rounded[i]);
+    pack(ball, nullptr, position, Mat3::Identity(), {same, shape[i], rounded[i]});
     support[i] = placed_support(ball, position, Mat3::Identity());
     extent += support[i].extent().sum();
   }
@@ -272,7 +279,7 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   const Vec3* control = index.control.data();
   for (std::size_t i = 0; i < n; ++i) {
     pack(skeleton.primitive[i], control, placed.position[i], balls ? Mat3(Mat3::Identity()) : placed.rotation[i],
-         index.primitive[i], index.shape[i], index.rounded[i]);
+         {index.primitive[i], index.shape[i], index.rounded[i]});
     control += skeleton.primitive[i].control.size();
     index.feature_size = std::min(index.feature_size, feature_of(skeleton.primitive[i]));
     index.uniform = index.uniform && index.primitive[i].kind == index.primitive[0].kind;

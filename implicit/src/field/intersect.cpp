@@ -62,7 +62,7 @@ class Tracer {
       f = field_.value(at(t));
       if (f == 0.0) return t;
       // Of what bounds have cleared only the rounding of the last step changes the sign.
-      if ((f > 0.0) != (f_before > 0.0)) return bracketed_root(field_, origin_, direction_, before, f_before, t, f);
+      if ((f > 0.0) != (f_before > 0.0)) return bracketed_root(field_, origin_, direction_, {before, f_before, t, f});
       stride = 2.0 * step;
     }
     return touch ? std::optional<double>(touch->t) : std::nullopt;
@@ -117,7 +117,7 @@ class Tracer {
     }
     if (least > bounds.round_off) return {.clear = stride};
     const bool monotone = along.lower > 0.0 || along.upper < 0.0;
-    if (monotone && to < 0.0) return {.root = bracketed_root(field_, origin_, direction_, t, f, t + stride, end)};
+    if (monotone && to < 0.0) return {.root = bracketed_root(field_, origin_, direction_, {t, f, t + stride, end})};
     return {.clear = clear};
   }
 

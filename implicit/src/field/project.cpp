@@ -19,8 +19,8 @@ double round_off(const Vec3& p, const Vec3& gradient) {
 
 }  // namespace
 
-double bracketed_root(const FieldView& field, const Vec3& a, const Vec3& along, double low, double f_low, double high,
-                      double f_high) {
+double bracketed_root(const FieldView& field, const Vec3& a, const Vec3& along, const Bracket& bracket) {
+  auto [low, f_low, high, f_high] = bracket;
   if (f_low == 0.0) return low;
   if (f_high == 0.0) return high;
   const double resolution = kEps * std::max(high, a.cwiseAbs().maxCoeff() / along.norm());
@@ -69,7 +69,7 @@ Projection project_to_surface(const FieldView& field, const Vec3& start, int max
     if (evaluated != nullptr) evaluated->include(result.point);  // a root is sought between this one and the last
     const bool crossed = (f > 0.0) != (f_previous > 0.0);
     if (crossed && std::abs(f) > 0.5 * std::abs(f_previous)) {
-      const double t = bracketed_root(field, previous, step, 0.0, f_previous, 1.0, f);
+      const double t = bracketed_root(field, previous, step, {0.0, f_previous, 1.0, f});
       result.point = previous + t * step;
       f = field.value(result.point, gradient);
       return finish(std::abs(f) <= round_off(result.point, gradient));
@@ -82,7 +82,7 @@ Vec3 root_on_segment(const FieldView& field, const Vec3& a, const Vec3& b) {
   const double f_a = field.value(a);
   const double f_b = field.value(b);
   SUPPLE_EXPECTS(f_a * f_b <= 0.0);
-  return a + bracketed_root(field, a, b - a, 0.0, f_a, 1.0, f_b) * (b - a);
+  return a + bracketed_root(field, a, b - a, {0.0, f_a, 1.0, f_b}) * (b - a);
 }
 
 }  // namespace supple::implicit

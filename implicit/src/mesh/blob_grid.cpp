@@ -190,8 +190,9 @@ void BlobGrid::gather(const Cells& base, std::int64_t size, std::int64_t margin,
   const BinRange bins = bins_near(base, {size, size, size}, margin);
   for (std::int64_t z = bins.from[2]; z <= bins.to[2]; ++z) add_runs(bins, z, runs);
   blobs::gather({x_.data(), y_.data(), z_.data(), scale_.data()}, runs,
-                {static_cast<double>(base[0]), static_cast<double>(base[1]), static_cast<double>(base[2])}, static_cast<double>(size),
-                static_cast<double>(margin), list, far);
+                {{static_cast<double>(base[0]), static_cast<double>(base[1]), static_cast<double>(base[2])}, static_cast<double>(size),
+                 static_cast<double>(margin)},
+                list, far);
 }
 
 void BlobGrid::gather_column(const Cells& base, std::int64_t size, std::int64_t height, Column& column) const {
@@ -217,7 +218,7 @@ void BlobGrid::gather(const Column& column, const Cells& base, std::int64_t size
     return start[static_cast<std::size_t>(std::clamp<std::int64_t>(layer - column.first_layer, 0, static_cast<std::int64_t>(start.size()) - 1))];
   };
   const std::size_t begin = at(bins.from[2]), end = std::max<std::size_t>(begin, at(bins.to[2] + 1));
-  blobs::gather(column.blobs, begin, end, static_cast<double>(base[2]), static_cast<double>(size), list, far);
+  blobs::gather(column.blobs, {begin, end, static_cast<double>(base[2]), static_cast<double>(size)}, list, far);
 }
 
 }  // namespace supple::implicit::blobs

@@ -36,14 +36,24 @@ HWY_INLINE float sum_of_lanes(const float* lane) {
 /// Centres are near a cube within half their radius, squared and relative.
 constexpr float kNear2 = 0.25F;
 
-/// Distances of eight or sixteen blobs to a cube, scaled by their radius.
+/// Eight or sixteen blobs, as in a BlobList.
+struct BlobLanes {
+  V scale, x, y, z;
+};
+/// Centre and half edge of a cube [cells].
+struct CubeLanes {
+  V x, y, z, half;
+};
+
+/// Distances of blobs to a cube, scaled by their radius.
 struct Distances {
   V near2, far2;
 };
-HWY_INLINE Distances distances(V s, V x, V y, V z, V cx, V cy, V cz, V half) {
+HWY_INLINE Distances distances(const BlobLanes& b, const CubeLanes& cube) {
   const D d;
-  const V reach = hn::Mul(s, half);
-  const V dx = hn::Abs(hn::MulSub(s, cx, x)), dy = hn::Abs(hn::MulSub(s, cy, y)), dz = hn::Abs(hn::MulSub(s, cz, z));
+  const V reach = hn::Mul(b.scale, cube.half);
+  const V dx = hn::Abs(hn::MulSub(b.scale, cube.x, b.x)), dy = hn::Abs(hn::MulSub(b.scale, cube.y, b.y)),
+          dz = hn::Abs(hn::MulSub(b.scale, cube.z, b.z));
   const auto near = [&](V v) HWY_ATTR { return hn::Max(hn::Sub(v, reach), hn::Zero(d)); };
   const V nx = near(dx), ny = near(dy), nz = near(dz);
   const V fx = hn::Add(dx, reach), fy = hn::Add(dy, reach), fz = hn::Add(dz, reach);
@@ -59,12 +69,12 @@ HWY_INLINE float round_off(std::size_t count, float size) {
 HWY_INLINE V cube(V t) { return hn::Mul(t, hn::Mul(t, t)); }
 
 /// Writes those marked behind the first `count` of a list. @return how many they are now
-HWY_INLINE std::size_t append(V s, V x, V y, V z, hn::Mask<D> keep, BlobList& list, std::size_t count) {
+HWY_INLINE std::size_t append(const BlobLanes& b, hn::Mask<D> keep, BlobList& list, std::size_t count) {
   const D d;
-  hn::StoreU(pack_lanes(s, keep), d, list.scale.data() + count);
-  hn::StoreU(pack_lanes(x, keep), d, list.x.data() + count);
-  hn::StoreU(pack_lanes(y, keep), d, list.y.data() + count);
-  hn::StoreU(pack_lanes(z, keep), d, list.z.data() + count);
+  hn::StoreU(pack_lanes(b.scale, keep), d, list.scale.data() + count);
+  hn::StoreU(pack_lanes(b.x, keep), d, list.x.data() + count);
+  hn::StoreU(pack_lanes(b.y, keep), d, list.y.data() + count);
+  hn::StoreU(pack_lanes(b.z, keep), d, list.z.data() + count);
   return count + hn::CountTrue(d, keep);
 }
 
@@ -93,17 +103,17 @@ class Gathered {
     if (far != nullptr) far->reserve(most);
   }
   /// The first `valid` lanes, those whose support may meet the cube.
-  HWY_INLINE void add(V s, V x, V y, V z, V near2, std::size_t valid) {
+  HWY_INLINE void add(const BlobLanes& b, V near2, std::size_t valid) {
     const D d;
     auto keep = hn::Lt(near2, hn::Set(d, kReach2));
     if (valid < kWidth) keep = hn::And(keep, hn::FirstN(d, valid));
     if (far_ == nullptr) {
-      count_ = append(s, x, y, z, keep, list_, count_);
+      count_ = append(b, keep, list_, count_);
       return;
     }
     const auto near = hn::Lt(near2, hn::Set(d, kNear2));
-    count_ = append(s, x, y, z, hn::And(near, keep), list_, count_);
-    far_count_ = append(s, x, y, z, hn::AndNot(near, keep), *far_, far_count_);
+    count_ = append(b, hn::And(near, keep), list_, count_);
+    far_count_ = append(b, hn::AndNot(near, keep), *far_, far_count_);
   }
   HWY_INLINE void finish() {
     if (far_ != nullptr) {
@@ -131,18 +141,17 @@ HWY_INLINE V scaled(const double* from, double origin, V s) {
   return hn::Combine(d, hn::DemoteTo(dh, hn::Mul(high, high_scale)), hn::DemoteTo(dh, hn::Mul(low, low_scale)));
 }
 
-void Gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
-            BlobList& list, BlobList* far) {
+void Gather(const BlobArrays& all, std::span<const BlobRun> runs, const CubeAround& cube, BlobList& list, BlobList* far) {
   const D d;
   std::size_t most = 0;
   for (const BlobRun& run : runs) most += run.end - run.begin;
   Gathered gathered(most, list, far);
-  const V centre = hn::Set(d, static_cast<float>(0.5 * size)), half = hn::Set(d, static_cast<float>(0.5 * size + margin));
+  const V centre = hn::Set(d, static_cast<float>(0.5 * cube.size)), half = hn::Set(d, static_cast<float>(0.5 * cube.size + cube.margin));
   for (const BlobRun& run : runs) {
     for (std::size_t i = run.begin; i < run.end; i += kWidth) {
       const V s = hn::LoadU(d, all.scale + i);
-      const V x = scaled(all.x + i, base[0], s), y = scaled(all.y + i, base[1], s), z = scaled(all.z + i, base[2], s);
-      gathered.add(s, x, y, z, distances(s, x, y, z, centre, centre, centre, half).near2, run.end - i);
+      const BlobLanes b{s, scaled(all.x + i, cube.base[0], s), scaled(all.y + i, cube.base[1], s), scaled(all.z + i, cube.base[2], s)};
+      gathered.add(b, distances(b, {centre, centre, centre, half}).near2, run.end - i);
     }
   }
   gathered.finish();
@@ -169,7 +178,7 @@ void GatherColumn(const BlobArrays& all, std::span<const BlobRun> runs, std::spa
         const V s = hn::LoadU(d, all.scale + i), x = scaled(all.x + i, base[0], s), y = scaled(all.y + i, base[1], s);
         // What is added along z takes none nearer.
         const V z = hn::Mul(s, half);
-        auto keep = hn::Lt(distances(s, x, y, z, half, half, half, half).near2, hn::Set(d, kReach2));
+        auto keep = hn::Lt(distances({s, x, y, z}, {half, half, half, half}).near2, hn::Set(d, kReach2));
         if (run.end - i < kWidth) keep = hn::And(keep, hn::FirstN(d, run.end - i));
         hn::StoreU(pack_lanes(s, keep), d, column.scale.data() + count);
         hn::StoreU(pack_lanes(x, keep), d, column.x.data() + count);
@@ -186,15 +195,14 @@ void GatherColumn(const BlobArrays& all, std::span<const BlobRun> runs, std::spa
   }
 }
 
-void GatherFromColumn(const BlobColumn& column, std::size_t begin, std::size_t end, double base_z, double size, BlobList& list,
-                      BlobList* far) {
+void GatherFromColumn(const BlobColumn& column, const ColumnCube& cube, BlobList& list, BlobList* far) {
   const D d;
-  Gathered gathered(end - begin, list, far);
-  const V half = hn::Set(d, static_cast<float>(0.5 * size));
-  for (std::size_t i = begin; i < end; i += kWidth) {
+  Gathered gathered(cube.end - cube.begin, list, far);
+  const V half = hn::Set(d, static_cast<float>(0.5 * cube.size));
+  for (std::size_t i = cube.begin; i < cube.end; i += kWidth) {
     const V s = hn::LoadU(d, column.scale.data() + i), x = hn::LoadU(d, column.x.data() + i), y = hn::LoadU(d, column.y.data() + i);
-    const V z = scaled(column.z.data() + i, base_z, s);
-    gathered.add(s, x, y, z, distances(s, x, y, z, half, half, half, half).near2, end - i);
+    const BlobLanes b{s, x, y, scaled(column.z.data() + i, cube.base_z, s)};
+    gathered.add(b, distances(b, {half, half, half, half}).near2, cube.end - i);
   }
   gathered.finish();
 }
@@ -210,20 +218,20 @@ HWY_INLINE PotentialBounds select_into(const BlobList& from, const std::array<fl
   std::size_t count = 0, far_count = 0;
   alignas(64) float lower[kLanes] = {}, upper[kLanes] = {};
   for (std::size_t i = 0; i < from.count; i += kWidth) {
-    const V s = hn::LoadU(d, from.scale.data() + i), x = hn::LoadU(d, from.x.data() + i), y = hn::LoadU(d, from.y.data() + i),
-            z = hn::LoadU(d, from.z.data() + i);
-    const Distances q = distances(s, x, y, z, cx, cy, cz, around);
+    const BlobLanes b{hn::LoadU(d, from.scale.data() + i), hn::LoadU(d, from.x.data() + i), hn::LoadU(d, from.y.data() + i),
+                      hn::LoadU(d, from.z.data() + i)};
+    const Distances q = distances(b, {cx, cy, cz, around});
     const auto keep = hn::Lt(q.near2, hn::Set(d, kReach2));
     const V most = hn::Max(hn::Sub(one, q.near2), hn::Zero(d)), least = hn::Max(hn::Sub(one, q.far2), hn::Zero(d));
     float *low = lower + i % kLanes, *high = upper + i % kLanes;
     hn::Store(hn::Add(hn::Load(d, high), cube(most)), d, high);
     hn::Store(hn::Add(hn::Load(d, low), cube(least)), d, low);
     if (far == nullptr) {
-      count = append(s, x, y, z, keep, list, count);
+      count = append(b, keep, list, count);
     } else {
       const auto near = hn::Lt(q.near2, hn::Set(d, kNear2));
-      count = append(s, x, y, z, near, list, count);
-      far_count = append(s, x, y, z, hn::AndNot(near, keep), *far, far_count);
+      count = append(b, near, list, count);
+      far_count = append(b, hn::AndNot(near, keep), *far, far_count);
     }
   }
   if (far != nullptr) {
@@ -475,9 +483,8 @@ void BlobList::pad() {
   }
 }
 
-void gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
-            BlobList& list, BlobList* far) {
-  HWY_DYNAMIC_DISPATCH(Gather)(all, runs, base, size, margin, list, far);
+void gather(const BlobArrays& all, std::span<const BlobRun> runs, const CubeAround& cube, BlobList& list, BlobList* far) {
+  HWY_DYNAMIC_DISPATCH(Gather)(all, runs, cube, list, far);
 }
 
 void gather_column(const BlobArrays& all, std::span<const BlobRun> runs, std::span<const std::uint32_t> layer,
@@ -485,8 +492,8 @@ void gather_column(const BlobArrays& all, std::span<const BlobRun> runs, std::sp
   HWY_DYNAMIC_DISPATCH(GatherColumn)(all, runs, layer, base, size, column);
 }
 
-void gather(const BlobColumn& column, std::size_t begin, std::size_t end, double base_z, double size, BlobList& list, BlobList* far) {
-  HWY_DYNAMIC_DISPATCH(GatherFromColumn)(column, begin, end, base_z, size, list, far);
+void gather(const BlobColumn& column, const ColumnCube& cube, BlobList& list, BlobList* far) {
+  HWY_DYNAMIC_DISPATCH(GatherFromColumn)(column, cube, list, far);
 }
 
 PotentialBounds select(const BlobList& from, const std::array<float, 3>& centre, float half, BlobList& list) {

@@ -43,10 +43,15 @@ struct BlobRun {
   std::size_t begin, end;
 };
 
-/// Those whose support may meet the cube that reaches from `margin` cells below `base` to `size + margin` above it; in the frame of
-/// `base`. @param far  null: in their order; otherwise scratch, and those come first whose centre lies within half a radius of the cube
-void gather(const BlobArrays& all, std::span<const BlobRun> runs, const std::array<double, 3>& base, double size, double margin,
-            BlobList& list, BlobList* far);
+/// A cube that reaches from `margin` below `base` to `size + margin` above it [cells].
+struct CubeAround {
+  std::array<double, 3> base;
+  double size, margin;
+};
+
+/// Those whose support may meet the cube, in the frame of its base.
+/// @param far  null: in their order; otherwise scratch, and those come first whose centre lies within half a radius of the cube
+void gather(const BlobArrays& all, std::span<const BlobRun> runs, const CubeAround& cube, BlobList& list, BlobList* far);
 
 /// Blobs around a column of cubes, by layers of bins: data that are read once for all of them.
 struct BlobColumn {
@@ -57,8 +62,13 @@ struct BlobColumn {
 /// Those whose support may meet some cube of `size` cells over x, y in `base`. @param layer  ends of the layers, numbers of runs
 void gather_column(const BlobArrays& all, std::span<const BlobRun> runs, std::span<const std::uint32_t> layer,
                    const std::array<double, 2>& base, double size, BlobColumn& column);
-/// What `gather` finds in the layers [begin, end) for the cube above `base_z`, by the column around it and without a margin.
-void gather(const BlobColumn& column, std::size_t begin, std::size_t end, double base_z, double size, BlobList& list, BlobList* far);
+/// A cube of a column [cells], and the layers [begin, end) of blobs that may reach it.
+struct ColumnCube {
+  std::size_t begin, end;
+  double base_z, size;
+};
+/// What the other `gather` finds for the cube without a margin.
+void gather(const BlobColumn& column, const ColumnCube& cube, BlobList& list, BlobList* far);
 
 /// Bounds of the potential on a box from the nearest and farthest distance of each blob; round-off included.
 struct PotentialBounds {
@@ -138,15 +148,21 @@ struct Placement {
   double cell;                   ///< [m]
 };
 
-/// World positions and unit normals of the edges [begin, end), three numbers each, and t and the normal, four numbers each. Where F
-/// has no gradient the normal is the direction of the edge. @param positions, normals, points  room for so many
-void place_vertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, double* positions,
-                    double* normals, float* points);
+/// Where vertices go: world positions and unit normals, three numbers each, and t and the normal, four numbers each.
+struct VertexRows {
+  double *positions, *normals;
+  float* points;
+};
+/// The edges [begin, end). Where F has no gradient the normal is the direction of the edge. @param to  room for so many
+void place_vertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, const VertexRows& to);
 
-/// Moves points [m] that lie near the surface to it, by Newton's method along the gradient, and gives their unit normals;
-/// three numbers each. Steps are at most half a cell.
-/// @param near  scratch
-void project_points(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
-                    std::size_t count, BlobList& near);
+/// Points [m] and unit normals, three numbers each.
+struct PointRows {
+  double *positions, *normals;
+  std::size_t count;
+};
+/// Moves points that lie near the surface to it, by Newton's method along the gradient, and gives their normals. Steps are at
+/// most half a cell. @param near  scratch
+void project_points(const BlobList& list, float iso, const Placement& placement, const PointRows& points, BlobList& near);
 
 }  // namespace supple::implicit::blobs

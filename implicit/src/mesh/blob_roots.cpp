@@ -152,8 +152,7 @@ void SolveEdges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t b
   }
 }
 
-void PlaceVertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, double* positions,
-                   double* normals, float* points) {
+void PlaceVertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, const VertexRows& rows) {
   const hn::CappedTag<double, 8> d;
   const hn::Rebind<float, decltype(d)> df;
   using VD = hn::Vec<decltype(d)>;
@@ -183,19 +182,19 @@ void PlaceVertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, c
       hn::StoreInterleaved4(hn::LoadU(df, edges.t.data() + v), single(normal[0]), single(normal[1]), single(normal[2]), df, to);
     };
     if (end - v >= kWide) {
-      store_points(points + 4 * n);
-      hn::StoreInterleaved3(position[0], position[1], position[2], d, positions + 3 * n);
-      hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, normals + 3 * n);
+      store_points(rows.points + 4 * n);
+      hn::StoreInterleaved3(position[0], position[1], position[2], d, rows.positions + 3 * n);
+      hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, rows.normals + 3 * n);
       continue;
     }
     alignas(64) double last[2][3 * kWide];
     alignas(64) float last_points[4 * kWide];
     store_points(last_points);
-    std::copy_n(last_points, 4 * (end - v), points + 4 * n);
+    std::copy_n(last_points, 4 * (end - v), rows.points + 4 * n);
     hn::StoreInterleaved3(position[0], position[1], position[2], d, last[0]);
     hn::StoreInterleaved3(normal[0], normal[1], normal[2], d, last[1]);
-    std::copy_n(last[0], 3 * (end - v), positions + 3 * n);
-    std::copy_n(last[1], 3 * (end - v), normals + 3 * n);
+    std::copy_n(last[0], 3 * (end - v), rows.positions + 3 * n);
+    std::copy_n(last[1], 3 * (end - v), rows.normals + 3 * n);
   }
 }
 
@@ -237,18 +236,17 @@ HWY_INLINE bool project_vector(const BlobList& list, float iso, float margin, fl
   return true;
 }
 
-void ProjectPoints(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
-                   std::size_t count, BlobList& near) {
+void ProjectPoints(const BlobList& list, float iso, const Placement& placement, const PointRows& points, BlobList& near) {
   constexpr float kMargin = 0.25F;  // most middles move less
   const double per_cell = 1.0 / placement.cell;
   alignas(64) float at[3][kLanes], slope[3][kLanes];
-  for (std::size_t v = 0; v < count; v += kWidth) {
-    const std::size_t n = std::min(kWidth, count - v);
+  for (std::size_t v = 0; v < points.count; v += kWidth) {
+    const std::size_t n = std::min(kWidth, points.count - v);
     float centre[3], half[3];
     for (std::size_t k = 0; k < 3; ++k) {
       float low = 1e30F, high = -1e30F;
       for (std::size_t i = 0; i < kWidth; ++i) {
-        const double p = positions[3 * (v + std::min(i, n - 1)) + k];
+        const double p = points.positions[3 * (v + std::min(i, n - 1)) + k];
         at[k][i] = static_cast<float>((p - placement.origin[k]) * per_cell - placement.base[k]);
         low = std::min(low, at[k][i]);
         high = std::max(high, at[k][i]);
@@ -259,8 +257,8 @@ void ProjectPoints(const BlobList& list, float iso, const Placement& placement, 
     cut(list, centre, half, near);
     if (!project_vector(near, iso, kMargin, at, slope)) (void)project_vector(list, iso, 1e30F, at, slope);
     for (std::size_t i = 0; i < n; ++i) {
-      double* p = positions + 3 * (v + i);
-      double* normal = normals + 3 * (v + i);
+      double* p = points.positions + 3 * (v + i);
+      double* normal = points.normals + 3 * (v + i);
       double norm2 = 0.0;
       for (std::size_t k = 0; k < 3; ++k) {
         p[k] = placement.origin[k] + placement.cell * (placement.base[k] + static_cast<double>(at[k][i]));
@@ -288,14 +286,12 @@ void solve_edges(const BlobList& list, float iso, EdgeBatch& edges, std::size_t 
   HWY_DYNAMIC_DISPATCH(SolveEdges)(list, iso, edges, begin, near);
 }
 
-void place_vertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, double* positions,
-                    double* normals, float* points) {
-  HWY_DYNAMIC_DISPATCH(PlaceVertices)(edges, begin, end, placement, positions, normals, points);
+void place_vertices(const EdgeBatch& edges, std::size_t begin, std::size_t end, const Placement& placement, const VertexRows& to) {
+  HWY_DYNAMIC_DISPATCH(PlaceVertices)(edges, begin, end, placement, to);
 }
 
-void project_points(const BlobList& list, float iso, const Placement& placement, double* positions, double* normals,
-                    std::size_t count, BlobList& near) {
-  HWY_DYNAMIC_DISPATCH(ProjectPoints)(list, iso, placement, positions, normals, count, near);
+void project_points(const BlobList& list, float iso, const Placement& placement, const PointRows& points, BlobList& near) {
+  HWY_DYNAMIC_DISPATCH(ProjectPoints)(list, iso, placement, points, near);
 }
 
 }  // namespace supple::implicit::blobs

@@ -61,25 +61,31 @@ struct LevelPart {
   }
 };
 
-/// Processes every cube of a level, in order; @return those to keep.
-LevelPart look(const LevelPart& level, int size, const BlockRange& range, const Lattice& lattice,
-               const Executor& executor, const RefineOptions& options, const Decide& decide) {
+/// Where the blocks of a level lie.
+struct LevelGrid {
+  const BlockRange& range;
+  const Lattice& lattice;
+  const RefineOptions& options;
+};
+
+/// Processes every cube of 2^size blocks of a level, in order; @return those to keep.
+LevelPart look(const LevelPart& level, int size, const LevelGrid& grid, const Decide& decide, const Executor& executor) {
   std::vector<LevelPart> parts((level.cube.size() + kBoxesPerTask - 1) / kBoxesPerTask);
   executor.for_blocks(level.cube.size(), kBoxesPerTask, [&](std::size_t begin, std::size_t end) {
     LevelPart& part = parts[begin / kBoxesPerTask];
     for (std::size_t i = begin; i < end; ++i) {
       Cube cube = level.cube[i];
       const std::span candidates(level.candidate.data() + cube.first, cube.count);
-      const BlockBox blocks = blocks_of(cube.at, size, range);
+      const BlockBox blocks = blocks_of(cube.at, size, grid.range);
       cube.first = static_cast<std::uint32_t>(part.candidate.size());
-      const Verdict verdict = decide(world_box(blocks, lattice, options.last_node), candidates, part.candidate);
+      const Verdict verdict = decide(world_box(blocks, grid.lattice, grid.options.last_node), candidates, part.candidate);
       cube.count = static_cast<std::uint32_t>(part.candidate.size()) - cube.first;
       if (verdict == Verdict::Keep) {
         part.cube.push_back(cube);
         continue;
       }
       part.candidate.resize(cube.first);
-      if (verdict == Verdict::Inside && options.keep_inside) part.inside.push_back(blocks);
+      if (verdict == Verdict::Inside && grid.options.keep_inside) part.inside.push_back(blocks);
     }
   });
   LevelPart joined;
@@ -118,7 +124,7 @@ class Refinement {
       std::uint64_t& looked = looked_[static_cast<std::size_t>(size)];
       looked += level.cube.size();
       if (looked > options_.limit * options_.look_factor) refuse(blocks_in(looked, size));
-      level = look(level, size, range_, lattice_, executor_, options_, decide_);
+      level = look(level, size, {range_, lattice_, options_}, decide_, executor_);
       found_.inside.insert(found_.inside.end(), level.inside.begin(), level.inside.end());
       const std::size_t count = level.cube.size();
       if (size == 0) {
@@ -170,7 +176,7 @@ class Refinement {
         share *= static_cast<double>(stride);
       }
       halve(level, --size, range_);
-      level = look(level, size, range_, lattice_, executor_, options_, decide_);
+      level = look(level, size, {range_, lattice_, options_}, decide_, executor_);
     }
     return share * static_cast<double>(level.cube.size());
   }

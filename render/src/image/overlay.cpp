@@ -110,11 +110,17 @@ double covered(int pixel, double lower, double upper) {
   return std::clamp(std::min(pixel + 1.0, upper) - std::max(static_cast<double>(pixel), lower), 0.0, 1.0);
 }
 
+/// Sides of a rectangle [pixels].
+struct Sides {
+  double left, top, right, bottom;
+};
+
+/// @param share  of the new colour  @param colour  of a row of pixels
 template <class Colour>
-void fill(Image& image, double left, double top, double right, double bottom, double share, const Colour& colour) {
-  for (int y = static_cast<int>(std::floor(top)); y < bottom; ++y)
-    for (int x = static_cast<int>(std::floor(left)); x < right; ++x)
-      mix(image, x, y, colour(y), share * covered(x, left, right) * covered(y, top, bottom));
+void fill(Image& image, const Sides& at, double share, const Colour& colour) {
+  for (int y = static_cast<int>(std::floor(at.top)); y < at.bottom; ++y)
+    for (int x = static_cast<int>(std::floor(at.left)); x < at.right; ++x)
+      mix(image, x, y, colour(y), share * covered(x, at.left, at.right) * covered(y, at.top, at.bottom));
 }
 
 std::string number(double value) {
@@ -137,14 +143,14 @@ double draw_scale_bar(Image& image, const ScaleBar& bar, double right) {
   const double top = 0.5 * (image.height - length) + 1.2 * text;
   const double bottom = top + length;
 
-  fill(image, left, top - 2.0 * text - margin, right, bottom + margin, 0.72, [](int) { return Vec3(1, 1, 1); });
+  fill(image, {left, top - 2.0 * text - margin, right, bottom + margin}, 0.72, [](int) { return Vec3(1, 1, 1); });
   draw_text(image, left + margin, top - 1.2 * text, text, bar.title);
   const double begin = left + margin;
-  fill(image, begin, top, begin + width, bottom, 1.0,
+  fill(image, {begin, top, begin + width, bottom}, 1.0,
        [&](int y) { return colour_of(bar.map, (bottom - (y + 0.5)) / length); });
   for (const double mark : marks) {
     const double y = bottom - length * (mark - bar.lower) / (bar.upper - bar.lower);
-    fill(image, begin + width, y - 0.05 * text, begin + width + 0.3 * text, y + 0.05 * text, 1.0,
+    fill(image, {begin + width, y - 0.05 * text, begin + width + 0.3 * text, y + 0.05 * text}, 1.0,
          [](int) { return Vec3(0.1, 0.1, 0.1); });
     draw_text(image, begin + width + 0.6 * text, y + 0.5 * text, text, number(mark));
   }

@@ -336,12 +336,12 @@ Geometry::Crossing Geometry::crossed(const Vec3f& from, const Vec3f& direction, 
 }
 
 bool Geometry::meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const {
-  return first_visible(crossed(from, direction, time, 0.0F), from, direction, time, choice, exact, hit);
+  return first_visible(crossed(from, direction, time, 0.0F), {from, direction, time, choice, exact}, hit);
 }
 
 /// Of what a ray crosses from this crossing on.
-bool Geometry::first_visible(Crossing crossing, const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact,
-                             Hit& hit) const {
+bool Geometry::first_visible(Crossing crossing, const Ray& ray, Hit& hit) const {
+  const auto& [from, direction, time, choice, exact] = ray;
   for (int layer = 0; layer < 32 && crossing.item != RTC_INVALID_GEOMETRY_ID; ++layer) {
     const Part& part = *parts_[crossing.item];
     const Item& item = items_[crossing.item];
@@ -504,7 +504,7 @@ LaneMask Geometry::meet(const RayBundle& rays, Lanes choice, bool exact, std::ar
   LaneMask met{};
   for (std::size_t k = 0; k < kLanes; ++k) {
     if (rays.who[k] == 0 || crossings[k].item == RTC_INVALID_GEOMETRY_ID) continue;
-    if (first_visible(crossings[k], rays.from.lane(k), rays.direction.lane(k), rays.time[k], choice[k], exact, hits[k])) met[k] = -1;
+    if (first_visible(crossings[k], {rays.from.lane(k), rays.direction.lane(k), rays.time[k], choice[k], exact}, hits[k])) met[k] = -1;
   }
   return met;
 }

@@ -80,8 +80,12 @@ class Geometry {
   [[nodiscard]] std::array<Crossing, kLanes> crossed(const RayBundle& rays) const;
   [[nodiscard]] Crossing crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const;
   void move_to_vertex(const Vec3f& from, const Vec3f& direction, float time, Crossing& crossing, bool& back) const;
-  [[nodiscard]] bool first_visible(Crossing crossing, const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact,
-                                   Hit& hit) const;
+  struct Ray {
+    Vec3f from, direction;
+    float time, choice;
+    bool exact;
+  };
+  [[nodiscard]] bool first_visible(Crossing crossing, const Ray& ray, Hit& hit) const;
   void refine(const Item& item, const Vec3f& direction, Hit& hit) const;
 
   RTCDevice device_ = nullptr;

@@ -341,13 +341,12 @@ void Film::resize(int across, int down) {
   for (Plane* plane : {&cover, &nearness, &mirror, &samples}) plane->resize(across, down);
 }
 
-void trace(const Geometry& geometry, const Lights& lights, const std::optional<GroundPlane>& ground, const CameraMatrices& camera,
-           const TraceSettings& settings, const Executor& executor, Film& film) {
-  const Tracer tracer(geometry, lights, ground, camera, settings);
+void trace(const TracedScene& scene, const TraceSettings& settings, const Executor& executor, Film& film) {
+  const Tracer tracer(scene.geometry, scene.lights, scene.ground, scene.camera, settings);
   film.resize(settings.width, settings.height);
   const Exposure exposure(tracer, settings, executor, film);
   exposure.expose_tiles();
-  find_details(camera, settings, executor, film);
+  find_details(scene.camera, settings, executor, film);
   exposure.expose_details();
 }
 

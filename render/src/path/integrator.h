@@ -57,9 +57,16 @@ struct Film {
   void resize(int across, int down);
 };
 
+/// What a picture is made of.
+struct TracedScene {
+  const Geometry& geometry;
+  const Lights& lights;
+  const std::optional<GroundPlane>& ground;
+  const CameraMatrices& camera;
+};
+
 /// The same bits for any number of threads: a tile of 8 x 8 pixels decides about its samples alone, and then each pixel by
 /// itself and its neighbours whether it holds detail that a filter cannot restore, and takes more camera rays.
-void trace(const Geometry& geometry, const Lights& lights, const std::optional<GroundPlane>& ground, const CameraMatrices& camera,
-           const TraceSettings& settings, const Executor& executor, Film& film);
+void trace(const TracedScene& scene, const TraceSettings& settings, const Executor& executor, Film& film);
 
 }  // namespace supple::render::path

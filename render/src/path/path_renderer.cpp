@@ -85,7 +85,7 @@ Image PathRenderer::render(const View& world, std::span<const Item> items, Linea
   trace.focus = view.camera.focus;
   {
     const CpuClock clock(times_.draw);
-    path::trace(geometry_, lights_of(view, settings_.shadow_softness), ground, camera, trace, executor_, film_);
+    path::trace({geometry_, lights_of(view, settings_.shadow_softness), ground, camera}, trace, executor_, film_);
     if (settings_.denoise) denoiser_.run(camera.eye, footprint, executor_, film_);
   }
   const CpuClock clock(times_.read_back);

@@ -107,7 +107,7 @@ Tracer::Light Tracer::sunlight(const Places& places, const Axes& axes, const Vec
 }
 
 /// Light from one of the rectangles.
-Vec3Lanes Tracer::lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, Random& random) const {
+Vec3Lanes Tracer::lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, const LightRays& to_lights, Random& random) const {
   if (lights_.rectangles.empty()) return Vec3Lanes::Zero();
   const Lanes which = random.number();
   const Pair<Lanes> at = random.pair();
@@ -128,9 +128,9 @@ Vec3Lanes Tracer::lamplight(const Places& places, const Axes& axes, const Vec3La
   const Lanes facing = -direction.dot(front);
   const Vec3Lanes in = axes.to_local(direction);
   const Vec3Lanes f = places.bsdf.evaluate(out, in);
-  const LaneMask lit = both(who, both(facing > 0.0F, f.maxCoeff() > 0.0F));
+  const LaneMask lit = both(to_lights.who, both(facing > 0.0F, f.maxCoeff() > 0.0F));
   if (!any(lit)) return Vec3Lanes::Zero();
-  const RayBundle to_lamp{.from = places.leave, .direction = direction, .time = time, .who = lit};
+  const RayBundle to_lamp{.from = places.leave, .direction = direction, .time = to_lights.time, .who = lit};
   const LaneMask blocked = geometry_.blocked(to_lamp, distance * 0.9999F);
   const Lanes density = density_of_face(area, facing, distance) / count;
   const Vec3Lanes light = f.cwiseProduct(radiance) * (power_share(density, places.bsdf.density(out, in)) / density);
@@ -138,14 +138,13 @@ Vec3Lanes Tracer::lamplight(const Places& places, const Axes& axes, const Vec3La
 }
 
 /// Light that comes straight from sun and rectangles.
-Vec3Lanes Tracer::direct(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, bool together,
-                         Random& random) const {
+Vec3Lanes Tracer::direct(const Places& places, const Axes& axes, const Vec3Lanes& out, const LightRays& to, Random& random) const {
   const Light sunny = sunlight(places, axes, out, random);
-  const LaneMask lit = both(who, sunny.light.maxCoeff() > 0.0F);
+  const LaneMask lit = both(to.who, sunny.light.maxCoeff() > 0.0F);
   LaneMask shadowed{};
   if (any(lit))
-    shadowed = geometry_.blocked({.from = places.leave, .direction = sunny.direction, .time = time, .who = lit, .together = together});
-  return select(both(lit, ~shadowed), sunny.light, Vec3Lanes::Zero()) + lamplight(places, axes, out, who, time, random);
+    shadowed = geometry_.blocked({.from = places.leave, .direction = sunny.direction, .time = to.time, .who = lit, .together = to.together});
+  return select(both(lit, ~shadowed), sunny.light, Vec3Lanes::Zero()) + lamplight(places, axes, out, to, random);
 }
 
 /// Light from the sky and from other surfaces.
@@ -190,7 +189,7 @@ Vec3Lanes Tracer::indirect(Places& places, const RayBundle& camera_rays, Random&
     const Vec3Lanes back = there.to_local(-rays.direction);
     rays.who = both(rays.who, back.z() > 0.0F);
     if (!any(rays.who)) break;
-    add(rays.who, direct(places, there, back, rays.who, rays.time, false, random));
+    add(rays.who, direct(places, there, back, {rays.who, rays.time}, random));
   }
   return sum;
 }
@@ -214,7 +213,7 @@ Samples Tracer::sample(const Picks& picks) const {
                .reflectance = on_surfaces(bsdf.reflectance(away.z())), .normal = on_surfaces(places.normal),
                .position = on_surfaces(places.point)};
   const LaneMask lit = both(met.surface, both(cover > 0.0F, away.z() > 0.0F));
-  out.direct = select(met.lamp, met.radiance, direct(places, axes, away, lit, rays.time, true, random));
+  out.direct = select(met.lamp, met.radiance, direct(places, axes, away, {lit, rays.time, true}, random));
 
   out.weight = select(picks.who, all_lanes(static_cast<float>(picks.share)), 0.0F);
   if (picks.sees_mirrors) out.weight = select(both(lit, out.mirror > kSharp), all_lanes(1.0F), out.weight);

@@ -112,13 +112,18 @@ class Tracer {
     Vec3Lanes direction;  ///< it comes from
   };
 
+  /// Of the rays from surfaces to lights: whose they are, their time, and whether those to the sun stay together.
+  struct LightRays {
+    LaneMask who;
+    Lanes time;
+    bool together = false;
+  };
+
   [[nodiscard]] RayBundle camera_rays(const Picks& picks, Random& random) const;
   [[nodiscard]] Meeting meet(const RayBundle& rays, Lanes choice, Places& places) const;
   [[nodiscard]] Light sunlight(const Places& places, const Axes& axes, const Vec3Lanes& out, Random& random) const;
-  [[nodiscard]] Vec3Lanes lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time,
-                                    Random& random) const;
-  [[nodiscard]] Vec3Lanes direct(const Places& places, const Axes& axes, const Vec3Lanes& out, LaneMask who, Lanes time, bool together,
-                                 Random& random) const;
+  [[nodiscard]] Vec3Lanes lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, const LightRays& to, Random& random) const;
+  [[nodiscard]] Vec3Lanes direct(const Places& places, const Axes& axes, const Vec3Lanes& out, const LightRays& to, Random& random) const;
   [[nodiscard]] Vec3Lanes indirect(Places& places, const RayBundle& camera_rays, Random& random, Lanes& nearness) const;
   [[nodiscard]] Lanes ground_share(const Vec3Lanes& point) const;
 

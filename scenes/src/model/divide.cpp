@@ -17,7 +17,7 @@ void find_excluded(const Model& model, const std::vector<Body>& bodies, Division
     const std::uint32_t a = bodies[division.body[k]].object;
     for (std::size_t j = k + 1; j < excluded.size(); ++j) {
       const std::uint32_t b = bodies[division.body[j]].object;
-      if (a == b || model.rules.allowed(a, b) || !division.claim[k].surface_box().overlaps(division.claim[j].surface_box())) continue;
+      if (a == b || model.rules.allowed(a, b) || !division.pressure[k].surface_box().overlaps(division.pressure[j].surface_box())) continue;
       excluded[k].push_back(j);
       excluded[j].push_back(k);
       any = true;
@@ -51,12 +51,12 @@ Division division_of(const Model& model, const std::vector<Body>& bodies, std::s
   }
   std::sort(out.body.begin(), out.body.end());
   out.body.erase(std::unique(out.body.begin(), out.body.end()), out.body.end());
-  std::vector<std::optional<collision::ClaimField>> claim(out.body.size());
-  executor.for_blocks(claim.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) claim[k].emplace(out.placed, out.body[k], surface, model.bulge);
+  std::vector<std::optional<collision::DeformedPressure>> pressure(out.body.size());
+  executor.for_blocks(pressure.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) pressure[k].emplace(out.placed, out.body[k], surface, model.bulge);
   });
-  out.claim.reserve(claim.size());
-  for (auto& c : claim) out.claim.push_back(std::move(*c));
+  out.pressure.reserve(pressure.size());
+  for (auto& c : pressure) out.pressure.push_back(std::move(*c));
   if (model.rules.allowed) find_excluded(model, bodies, out);
   return out;
 }
@@ -66,7 +66,7 @@ std::map<std::string, std::map<std::string, ShortBulges>> find_short_bulges(cons
   const auto object = [&](std::uint32_t body) -> const std::string& { return object_name(model, bodies, body); };
   std::map<std::string, std::map<std::string, ShortBulges>> found;
   for (std::size_t k = 0; k < division.body.size(); ++k) {
-    for (const collision::BulgeVolume& bulge : division.claim[k].volumes()) {
+    for (const collision::BulgeVolume& bulge : division.pressure[k].volumes()) {
       if (!bulge.falls_short()) continue;
       found[object(division.body[k])][object(bulge.other)].add({.count = 1, .held = bulge.held / bulge.displaced, .time = time});
     }
@@ -76,8 +76,8 @@ std::map<std::string, std::map<std::string, ShortBulges>> find_short_bulges(cons
 
 std::vector<std::size_t> Division::others_of(std::size_t k) const {
   std::vector<std::size_t> others;
-  for (std::size_t j = 0; j < claim.size(); ++j) {
-    if (j == k || !claim[j].surface_box().overlaps(claim[k].surface_box())) continue;
+  for (std::size_t j = 0; j < pressure.size(); ++j) {
+    if (j == k || !pressure[j].surface_box().overlaps(pressure[k].surface_box())) continue;
     if (excluded.empty() || !std::binary_search(excluded[k].begin(), excluded[k].end(), j)) others.push_back(j);
   }
   return others;

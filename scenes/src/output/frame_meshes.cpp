@@ -77,13 +77,13 @@ implicit::DelaunayOptions delaunay_options(const StageContext& context, const im
   return {.angle = d.angle, .size = size, .distance = d.distance.value_or(0.1 * size), .cell = lattice.cell, .interrupt = context.interrupt};
 }
 
-/// Version numbers of the claims of a division, by their inputs. Meshers of lattices that the last frame did not use are removed.
+/// Version numbers of the deformed pressures of a division, by their inputs. Meshers of lattices that the last frame did not use are removed.
 std::vector<std::uint64_t> versions_of(const StageContext& context, const Division& division, Frame& frame) {
   DivisionMeshers& dividing = frame.dividing;
   std::erase_if(dividing.mesher, [](const auto& on) { return !on.used; });
   for (auto& on : dividing.mesher) on.used = false;
   dividing.fields.begin_frame();
-  dividing.claims.begin_frame();
+  dividing.pressures.begin_frame();
   std::vector<std::optional<std::uint64_t>> field(division.placed.size());
   const auto field_of = [&](std::uint32_t body) {
     if (field[body]) return *field[body];
@@ -93,10 +93,10 @@ std::vector<std::uint64_t> versions_of(const StageContext& context, const Divisi
   };
   std::vector<std::uint64_t> version;
   ContentWords words;
-  for (const collision::ClaimField& claim : division.claim) {
+  for (const collision::DeformedPressure& pressure : division.pressure) {
     words.clear();
-    claim.add_content(field_of, words);
-    version.push_back(dividing.claims.of(words.view()));
+    pressure.add_content(field_of, words);
+    version.push_back(dividing.pressures.of(words.view()));
   }
   return version;
 }
@@ -109,8 +109,8 @@ DivisionMeshers::OnLattice& mesher_of(const DivisionGroup& group, DivisionMesher
   return *on;
 }
 
-/// The claims of some bodies, and the mesher of their lattice.
-struct Claims {
+/// The deformed pressures of some bodies, and the mesher of their lattice.
+struct Pressures {
   std::vector<implicit::FieldView> view;
   std::vector<std::uint64_t> version;
   DivisionMeshers::OnLattice* mesher = nullptr;  ///< null: nothing is kept
@@ -127,9 +127,9 @@ std::pair<implicit::Lattice, implicit::PartitionError> to_error(const DivisionGr
 }
 
 /// The meshes of bodies that touch, within the bounds of the scene.
-std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, const Claims& claims, const implicit::Lattice& lattice,
+std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group, const Pressures& pressures, const implicit::Lattice& lattice,
                          implicit::PolygoniseCounts& counts, SearchCounts& missed) {
-  const std::vector<implicit::FieldView>& views = claims.view;
+  const std::vector<implicit::FieldView>& views = pressures.view;
   const Executor& executor = context.executor;
   if (context.model.meshing.method == MeshingName::Delaunay) {
     implicit::DelaunayReport report;
@@ -139,11 +139,11 @@ std::vector<Mesh> divide(const StageContext& context, const DivisionGroup& group
     return meshes;
   }
   if (group.strictest == nullptr) {
-    return claims.mesher != nullptr ? claims.mesher->mesher.make(views, claims.version, lattice, executor, &counts)
+    return pressures.mesher != nullptr ? pressures.mesher->mesher.make(views, pressures.version, lattice, executor, &counts)
                                     : implicit::polygonise_partition(views, lattice, executor, &counts);
   }
   const auto [coarsest, error] = to_error(group, views, lattice);
-  return claims.mesher != nullptr ? claims.mesher->error_mesher.make(views, claims.version, coarsest, error, executor, &counts)
+  return pressures.mesher != nullptr ? pressures.mesher->error_mesher.make(views, pressures.version, coarsest, error, executor, &counts)
                                   : implicit::polygonise_partition_within(views, coarsest, error, executor, &counts);
 }
 
@@ -219,10 +219,10 @@ void search_between(const StageContext& context, const Division& division, const
 }
 
 /// The surfaces of some bodies of a group, in their order. @param lattice  whose cell becomes the one that was used
-std::vector<Mesh> divide_some(const StageContext& context, const DivisionGroup& group, const Claims& claims, implicit::Lattice& lattice,
+std::vector<Mesh> divide_some(const StageContext& context, const DivisionGroup& group, const Pressures& pressures, implicit::Lattice& lattice,
                               StageProfile& profile, SearchCounts& missed) {
   implicit::PolygoniseCounts counts;
-  std::vector<Mesh> parts = divide(context, group, claims, lattice, counts, missed);
+  std::vector<Mesh> parts = divide(context, group, pressures, lattice, counts, missed);
   lattice.cell = counts.cell;
   profile.visited += counts.blocks_visited;
   profile.present += counts.blocks_present;
@@ -242,21 +242,21 @@ void mesh_group(const StageContext& context, const DividedBodies& bodies, const 
   const double cell = group.finest->cell;
   const implicit::Lattice lattice{.origin = cell * kOffPlanes, .cell = cell};
   implicit::Lattice used = lattice;
-  Claims claims;
+  Pressures pressures;
   for (const std::size_t k : group.member) {
-    claims.view.emplace_back(division.claim[k]);
-    claims.version.push_back(version[k]);
+    pressures.view.emplace_back(division.pressure[k]);
+    pressures.version.push_back(version[k]);
   }
-  if (context.model.meshing.method != MeshingName::Delaunay) claims.mesher = &mesher_of(group, frame.dividing);
-  std::vector<Mesh> parts = divide_some(context, group, claims, used, profile, frame.missed);
+  if (context.model.meshing.method != MeshingName::Delaunay) pressures.mesher = &mesher_of(group, frame.dividing);
+  std::vector<Mesh> parts = divide_some(context, group, pressures, used, profile, frame.missed);
   search_between(context, division, group, used, frame, parts);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     const std::size_t k = group.member[n];
     if (division.passes(k)) {
-      Claims some;
-      some.view.emplace_back(division.claim[k]);
+      Pressures some;
+      some.view.emplace_back(division.pressure[k]);
       for (const std::size_t j : division.others_of(k)) {
-        if (std::binary_search(group.member.begin(), group.member.end(), j)) some.view.emplace_back(division.claim[j]);
+        if (std::binary_search(group.member.begin(), group.member.end(), j)) some.view.emplace_back(division.pressure[j]);
       }
       implicit::Lattice own = lattice;
       parts[n] = std::move(divide_some(context, group, some, own, profile, frame.missed).front());
@@ -446,7 +446,7 @@ void expect_mesh_sizes(Simulation& simulation, const std::function<bool(const Bo
   for (const DivisionGroup& group : groups_of(model, bodies, division)) {
     constexpr std::uint64_t kBlocksASecond = 1000;
     std::vector<implicit::FieldView> views;
-    for (const std::size_t k : group.member) views.emplace_back(division.claim[k]);
+    for (const std::size_t k : group.member) views.emplace_back(division.pressure[k]);
     const implicit::Lattice lattice{.origin = group.finest->cell * kOffPlanes, .cell = group.finest->cell};
     try {
       if (group.strictest == nullptr) {

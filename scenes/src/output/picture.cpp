@@ -266,10 +266,10 @@ void ScenePictures::add_objects(Simulation& simulation) {
 
 namespace {
 
-/// The surface of a body: F, or F~ = (p - max(p_j, 0)) / P of the claims p where it touches others.
+/// The surface of a body: F, or F~ = (p - max(p_j, 0)) / P of the deformed pressures p where it touches others.
 struct Piece {
   struct Other {
-    implicit::FieldView claim;
+    implicit::FieldView pressure;
     Box positive;
   };
   implicit::FieldView own;
@@ -282,9 +282,9 @@ struct Piece {
     for (const Other& other : others) {
       if (!other.positive.contains(at)) continue;
       Vec3 steepness;
-      const double claim = other.claim.value(at, steepness);
-      if (claim <= taken) continue;
-      taken = claim;
+      const double pressure = other.pressure.value(at, steepness);
+      if (pressure <= taken) continue;
+      taken = pressure;
       slope = steepness;
     }
     gradient = scale * (gradient - slope);
@@ -342,10 +342,10 @@ void ScenePictures::add_fields(Simulation& simulation) {
       continue;
     }
     const auto k = static_cast<std::size_t>(at - division.body.begin());
-    Piece piece{.own = division.claim[k], .scale = 1.0 / division.placed[i].material.modulus, .others = {}};
+    Piece piece{.own = division.pressure[k], .scale = 1.0 / division.placed[i].material.modulus, .others = {}};
     for (const std::size_t j : division.others_of(k)) {
-      const implicit::FieldView claim = division.claim[j];
-      piece.others.push_back({claim, claim.surface_box()});
+      const implicit::FieldView pressure = division.pressure[j];
+      piece.others.push_back({pressure, pressure.surface_box()});
     }
     of_object.push_back(std::move(piece));
   }

@@ -17,27 +17,27 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The claim of a body that others divide, and those that may reduce it.
-struct Claims {
-  collision::ClaimField own;
-  std::vector<collision::ClaimField> others;
+/// The deformed pressure of a body that others divide, and those that may reduce it.
+struct Pressures {
+  collision::DeformedPressure own;
+  std::vector<collision::DeformedPressure> others;
 };
 
-Claims claims_of(const Division& division, std::size_t at) {
-  Claims claims{division.claim[at], {}};
-  for (const std::size_t k : division.others_of(at)) claims.others.push_back(division.claim[k]);
-  return claims;
+Pressures pressures_of(const Division& division, std::size_t at) {
+  Pressures pressures{division.pressure[at], {}};
+  for (const std::size_t k : division.others_of(at)) pressures.others.push_back(division.pressure[k]);
+  return pressures;
 }
 
 implicit::GridContent content_of(const GriddingDesc& gridding) {
   return gridding.content == GridContentName::Field ? implicit::GridContent::Field : implicit::GridContent::SignedDistance;
 }
 
-/// Version numbers of the fields and claims of a frame.
+/// Version numbers of the fields and deformed pressures of a frame.
 class BodyVersions {
  public:
   BodyVersions(Simulation& simulation, const Division& division, ContentVersions& versions)
-      : simulation_(simulation), division_(division), versions_(versions), field_(division.placed.size()), claim_(division.claim.size()) {
+      : simulation_(simulation), division_(division), versions_(versions), field_(division.placed.size()), pressure_(division.pressure.size()) {
     versions_.begin_frame();
   }
   [[nodiscard]] std::uint64_t field(std::uint32_t body) {
@@ -48,36 +48,36 @@ class BodyVersions {
     return *(field_[body] = versions_.of(words.view()));
   }
   /// @param k  of the division
-  [[nodiscard]] std::uint64_t claim(std::size_t k) {
-    if (claim_[k]) return *claim_[k];
+  [[nodiscard]] std::uint64_t pressure(std::size_t k) {
+    if (pressure_[k]) return *pressure_[k];
     ContentWords words;
-    words.add(Kind::Claim);
-    division_.claim[k].add_content([this](std::uint32_t body) { return field(body); }, words);
-    return *(claim_[k] = versions_.of(words.view()));
+    words.add(Kind::Pressure);
+    division_.pressure[k].add_content([this](std::uint32_t body) { return field(body); }, words);
+    return *(pressure_[k] = versions_.of(words.view()));
   }
   /// The grid of a body that others divide.
   [[nodiscard]] std::uint64_t grid(std::size_t k, const std::string& name) {
     ContentWords words;
     words.add(Kind::Grid);
     for (const char c : name) words.add(static_cast<std::uint64_t>(c));
-    words.add(claim(k));
-    for (const std::size_t other : division_.others_of(k)) words.add(claim(other));
+    words.add(pressure(k));
+    for (const std::size_t other : division_.others_of(k)) words.add(pressure(other));
     return versions_.of(words.view());
   }
 
  private:
-  enum class Kind : std::uint8_t { Field, Claim, Grid };
+  enum class Kind : std::uint8_t { Field, Pressure, Grid };
   Simulation& simulation_;
   const Division& division_;
   ContentVersions& versions_;
-  std::vector<std::optional<std::uint64_t>> field_, claim_;
+  std::vector<std::optional<std::uint64_t>> field_, pressure_;
 };
 
-implicit::SurfaceGrid make_divided(Claims claims, double modulus, const implicit::GridOptions& options, const Executor& executor) {
+implicit::SurfaceGrid make_divided(Pressures pressures, double modulus, const implicit::GridOptions& options, const Executor& executor) {
   if (options.content == implicit::GridContent::SignedDistance) {
-    return implicit::make_surface_grid(collision::DeformedDepth(std::move(claims.own), std::move(claims.others)), options, executor);
+    return implicit::make_surface_grid(collision::DeformedDepth(std::move(pressures.own), std::move(pressures.others)), options, executor);
   }
-  return implicit::make_surface_grid(collision::DeformedField(std::move(claims.own), std::move(claims.others), modulus), options, executor);
+  return implicit::make_surface_grid(collision::DeformedField(std::move(pressures.own), std::move(pressures.others), modulus), options, executor);
 }
 
 }  // namespace
@@ -112,8 +112,8 @@ void SceneGrids::write(const fs::path& folder, const std::string& name, int fram
     if (gridding.of != GriddedName::Objects) {
       // With its bulges, but without the reduction by others: that is in the union.
       const implicit::FieldView whole =
-          apart ? implicit::FieldView(fields[i]) : bulging.emplace_back(division.claim[at], std::vector<collision::ClaimField>{}, modulus);
-      united.push_back({distance ? implicit::FieldView(depth.emplace_back(whole)) : whole, apart ? versions.field(i) : versions.claim(at),
+          apart ? implicit::FieldView(fields[i]) : bulging.emplace_back(division.pressure[at], std::vector<collision::DeformedPressure>{}, modulus);
+      united.push_back({distance ? implicit::FieldView(depth.emplace_back(whole)) : whole, apart ? versions.field(i) : versions.pressure(at),
                         apart ? &fields[i] : nullptr});
     }
     if (gridding.of == GriddedName::Scene) continue;
@@ -126,7 +126,7 @@ void SceneGrids::write(const fs::path& folder, const std::string& name, int fram
       if (auto kept = divided_.extract(version); !kept.empty()) {
         grids.push_back(&divided.insert(std::move(kept)).position->second);
       } else {
-        grids.push_back(&divided.emplace(version, make_divided(claims_of(division, at), modulus, options, executor)).first->second);
+        grids.push_back(&divided.emplace(version, make_divided(pressures_of(division, at), modulus, options, executor)).first->second);
       }
     } catch (const Error& error) {
       throw with_keys_of(model, error, &object, nullptr);

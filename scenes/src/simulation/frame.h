@@ -45,7 +45,7 @@ struct DivisionMeshers {
     implicit::PartitionErrorMesher error_mesher{};  ///< with one
   };
   std::vector<OnLattice> mesher;
-  ContentVersions fields, claims;
+  ContentVersions fields, pressures;
 };
 
 struct Frame {

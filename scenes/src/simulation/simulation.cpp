@@ -116,6 +116,31 @@ void Simulation::Impl::step() {
 }
 
 void Simulation::Impl::make_step() {
+  begin_step();
+  if (awake.empty()) {
+    frame.surface.clear();
+  } else {
+    integrate();
+  }
+  ++state.steps;
+  ++state.substep;
+  check_divergence();
+  check_fixed_step();
+  book_contacts();
+  commit_friction();
+  wake_touched();
+  watch_pressing();
+  update_links();
+  hold_volumes();
+  lay_to_sleep();
+  if (state.substep == (1 << state.halvings)) {
+    state.substep = 0;
+    ++state.frame;
+  }
+}
+
+/// The length of the step, what its checks compare with, and what of the scene takes part in it.
+void Simulation::Impl::begin_step() {
   drop_results();
   if (state.substep == 0) {
     last_frame = state;
@@ -131,6 +156,10 @@ void Simulation::Impl::make_step() {
   }
   if (bodies.size() != model.objects.size() && note_apart(context(), state.particles, pulled, state.apart)) divide_anew();
   wake_loaded();
+}
+
+/// Stages 1 to 8 for what is awake.
+void Simulation::Impl::integrate() {
   // Velocity Verlet observes this by itself; an adaptive integrator chooses steps of its own inside this one.
   const core::Integrator method = integrator.settings.method;
   const bool whole = method != core::Integrator::Symplectic && method != core::Integrator::Adaptive;
@@ -138,53 +167,46 @@ void Simulation::Impl::make_step() {
   const core::ForceModel forces = [this](const core::ParticleState& at_state, double at, core::ForceSample& out) {
     evaluate_forces(at_state, at, out);
   };
-  if (awake.empty()) {
-    frame.surface.clear();
-  } else {
-    StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
-    core::ImplicitContact contact = implicit_contact();
-    const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr},
-                                                  time(), dt(), {state.particles, state.kick, state.ledger},
-                                                  {executor, workspace, integrator_workspace});
-    if (contact.find) {
-      frame.pair_power.resize(contact.load.size());
-      frame.friction_speed.resize(contact.load.size());
-      for (std::size_t k = 0; k < contact.load.size(); ++k) {
-        frame.pair_power[k] = contact.load[k].dissipated / dt();
-        const double friction_of_pair = collision::material_of(frame.bodies, rules, frame.surface.summary[k].bodies).friction;
-        frame.friction_speed[k] = friction_of_pair > 0.0 ? contact.load[k].stick_speed : 0.0;
-      }
-      friction.look(context(), frame);
-    }
-    book_work(report);
-    ++p.calls;
-    for (const std::uint32_t i : awake) p.visited += bodies[i].origin.is_group() ? 0 : bodies[i].particle.size();
-    p.present += particles.size();
+  core::ImplicitContact contact = implicit_contact();
+  const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr},
+                                                time(), dt(), {state.particles, state.kick, state.ledger},
+                                                {executor, workspace, integrator_workspace});
+  if (contact.find) take_contact_loads(contact.load);
+  book_work(report);
+  StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
+  ++p.calls;
+  for (const std::uint32_t i : awake) p.visited += bodies[i].origin.is_group() ? 0 : bodies[i].particle.size();
+  p.present += particles.size();
+}
+
+/// What an implicit step found of each pair of bodies in contact.
+void Simulation::Impl::take_contact_loads(std::span<const core::ContactPairLoad> loads) {
+  frame.pair_power.resize(loads.size());
+  frame.friction_speed.resize(loads.size());
+  for (std::size_t k = 0; k < loads.size(); ++k) {
+    frame.pair_power[k] = loads[k].dissipated / dt();
+    const double friction_of_pair = collision::material_of(frame.bodies, rules, frame.surface.summary[k].bodies).friction;
+    frame.friction_speed[k] = friction_of_pair > 0.0 ? loads[k].stick_speed : 0.0;
   }
-  ++state.steps;
-  ++state.substep;
+  friction.look(context(), frame);
+}
+
+/// Throws, with the last frame as the state, where particles are farther or faster than any of the scene can be.
+void Simulation::Impl::check_divergence() {
   const double until = std::max(scene.duration, time());
   const core::Divergence divergence =
       core::find_divergence(model.particles, state.particles, model.believable.distance(until), model.believable.fastest(until));
-  if (divergence.found) {
-    const std::uint64_t step = state.steps;
-    const double at = time();
-    if (last_frame.record.valid) take(last_frame);
-    throw_diverged(divergence, step, at);
-  }
-  check_fixed_step();
+  if (!divergence.found) return;
+  const std::uint64_t step = state.steps;
+  const double at = time();
+  if (last_frame.record.valid) take(last_frame);
+  throw_diverged(divergence, step, at);
+}
+
+void Simulation::Impl::book_contacts() {
   if (!awake.empty()) book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
-  if (state.substep == (1 << state.halvings) && !core::is_implicit(method) && contact_on()) friction.look(context(), frame);
-  commit_friction();
-  wake_touched();
-  watch_pressing();
-  update_links();
-  hold_volumes();
-  lay_to_sleep();
-  if (state.substep == (1 << state.halvings)) {
-    state.substep = 0;
-    ++state.frame;
-  }
+  const bool ends_frame = state.substep == (1 << state.halvings);
+  if (ends_frame && !core::is_implicit(integrator.settings.method) && contact_on()) friction.look(context(), frame);
 }
 
 /// Substeps stay on the grid of the frame.
@@ -202,8 +224,8 @@ void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, doub
   if (!options.skip || plan.on(Stage::Interact)) {
     StageProfile& p = profile[static_cast<std::size_t>(Stage::Interact)];
     StageTimer timer(p, timed);
-    const core::InteractionCounts counts = core::accumulate_interactions(
-        particles, at_state, awake_laws, at, executor, workspace, out.internal, out.external);
+    const core::InteractionCounts counts = core::accumulate_interactions(particles, at_state, awake_laws, executor, workspace, out.internal);
+    core::add_external_loads(particles, awake_laws, at, out.external);
     p.visited += counts.pairs_visited;
     p.present += counts.pairs_present;
   }

@@ -70,7 +70,11 @@ struct Simulation::Impl {
   StageContext context();
   void step();
   void make_step();
+  void begin_step();
   void refine_step();
+  void integrate();
+  void take_contact_loads(std::span<const core::ContactPairLoad> loads);
+  void book_contacts();
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out);
   core::ImplicitContact implicit_contact();
   void commit_friction();
@@ -112,6 +116,7 @@ struct Simulation::Impl {
   void watch_pressing();
   [[nodiscard]] bool energies_balance() const;
   void check_energy();
+  void check_divergence();
   [[noreturn]] void throw_too_coarse(const TooCoarse& found);
   [[noreturn]] void throw_diverged(const core::Divergence& divergence, std::uint64_t step_number, double at) const;
   /// For evaluations that are not part of a step.

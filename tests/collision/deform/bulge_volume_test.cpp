@@ -113,9 +113,9 @@ struct Balance {
 template <class Volume>
 Balance balance_of(Stage& stage, double width, const Volume& volume) {
   const BulgeSettings settings{.width = width, .keep_volume = true};
-  const ClaimField claim(stage.bodies(), 0, stage.surface, settings);
+  const DeformedPressure pressure(stage.bodies(), 0, stage.surface, settings);
   Balance out;
-  out.bulges.assign(claim.volumes().begin(), claim.volumes().end());
+  out.bulges.assign(pressure.volumes().begin(), pressure.volumes().end());
   const double cut = volume(DeformedField(stage.bodies(), 0, stage.surface, {.attenuation = 0.0}));
   out.lost = volume(stage.bodies()[0].field) - cut;
   out.gained = volume(DeformedField(stage.bodies(), 0, stage.surface, settings)) - cut;
@@ -239,15 +239,15 @@ TEST(KeptVolumes, BeginWithTheBulgeOfFirstOrder) {
     stage.add(upper.field, {Vec3::Zero()}, 1e4);
     stage.add(lower.field, {Vec3::Zero()}, 1e4);
     stage.solve({.error = 1e-6});
-    const ClaimField claim(stage.bodies(), 0, stage.surface, {.width = kAsNeeded, .keep_volume = true});
-    ASSERT_EQ(claim.volumes().size(), 1u);
-    EXPECT_FALSE(claim.volumes()[0].falls_short());
+    const DeformedPressure pressure(stage.bodies(), 0, stage.surface, {.width = kAsNeeded, .keep_volume = true});
+    ASSERT_EQ(pressure.volumes().size(), 1u);
+    EXPECT_FALSE(pressure.volumes()[0].falls_short());
     // On the surface of the undeformed ball beside the contact, of half-width sqrt(overlap): its largest lift is a0.
     double lift = 0.0;
     for (int k = 0; k < 4000; ++k) {
       const double a = 4.0 * std::sqrt(overlap) * k / 4000.0;
       const Vec3 at(std::sin(a), 0.0, -std::cos(a));
-      lift = std::max(lift, implicit::FieldView(claim).value(at) - 1e4 * implicit::FieldView(upper.field).value(at));
+      lift = std::max(lift, implicit::FieldView(pressure).value(at) - 1e4 * implicit::FieldView(upper.field).value(at));
     }
     const ContactSurface::Summary& s = stage.surface.summary.at(0);
     Vec3 a_slope, b_slope;
@@ -270,15 +270,15 @@ TEST(KeptVolumes, FillNoSpaceFarFromTheBody) {
   stage.add(ball.field, {Vec3::Zero()}, 1e3);
   for (const Solid& s : cage) stage.add(s.field, {Vec3::Zero()}, 1e4);
   stage.solve({.error = 1e-3});
-  const ClaimField claim(stage.bodies(), 0, stage.surface, {.width = kAsNeeded, .keep_volume = true});
-  ASSERT_EQ(claim.volumes().size(), 4u);
+  const DeformedPressure pressure(stage.bodies(), 0, stage.surface, {.width = kAsNeeded, .keep_volume = true});
+  ASSERT_EQ(pressure.volumes().size(), 4u);
   double largest = 0.0;
   for (int k = 0; k < 64; ++k) {
     for (int j = 0; j < 64; ++j) {
       const double z = (k + 0.5) / 32.0 - 1.0, r = std::sqrt(1.0 - z * z), a = 2.0 * std::numbers::pi * j / 64.0;
       for (double rho = 0.8; rho < 3.0; rho += 0.05) {
         const Vec3 at = rho * Vec3(r * std::cos(a), r * std::sin(a), z);
-        largest = std::max(largest, implicit::FieldView(claim).value(at) - 1e3 * implicit::FieldView(ball.field).value(at));
+        largest = std::max(largest, implicit::FieldView(pressure).value(at) - 1e3 * implicit::FieldView(ball.field).value(at));
       }
     }
   }

@@ -96,14 +96,14 @@ TEST(DeformedField, IsZeroOnTheContactSurfaceForBothBodies) {
 }
 
 // Two balls of radius 1 whose pressures fall like distances meet in the plane x = 0; their undeformed surfaces end 0.3 beyond it.
-TEST(DeformedDepth, IsThatBehindTheContactSurfaceAlsoWhereTheOtherBodyClaimsNothing) {
+TEST(DeformedDepth, IsThatBehindTheContactSurfaceAlsoWhereTheOtherBodyHasNoPressure) {
   const LinearSphere left{Vec3(-0.7, 0, 0), {}}, right{Vec3(0.7, 0, 0), {}};
   Stage stage;
   stage.add(left, {left.centre}, 1e4);
   stage.add(right, {right.centre}, 1e4);
   stage.solve({.error = 1e-4});
-  const auto claim = [&](std::uint32_t body) { return ClaimField(stage.bodies(), body, stage.surface, {.attenuation = 0.0}); };
-  const DeformedDepth depth(claim(0), {claim(1)});
+  const auto pressure = [&](std::uint32_t body) { return DeformedPressure(stage.bodies(), body, stage.surface, {.attenuation = 0.0}); };
+  const DeformedDepth depth(pressure(0), {pressure(1)});
   const implicit::FieldView view(depth);
   Vec3 slope;
   for (const double x : {-0.6, -0.301, -0.299, -0.1, -1e-9, 1e-9, 0.1, 0.2}) {  // first order is exact on the axis
@@ -219,7 +219,7 @@ TEST_P(EitherBulge, LiesWithinItsBounds) {
   Touching scene;
   for (const std::uint32_t body : {0u, 1u}) {
     const DeformedField field(scene.stage.bodies(), body, scene.stage.surface, settings);
-    const ClaimField claim(scene.stage.bodies(), body, scene.stage.surface, settings);
+    const DeformedPressure pressure(scene.stage.bodies(), body, scene.stage.surface, settings);
     std::mt19937_64 engine(9);
     for (const Vec3& corner : random_points(10 + body, 300)) {
       const double size = 0.3 * static_cast<double>(engine() >> 11) * 0x1p-53;
@@ -229,14 +229,14 @@ TEST_P(EitherBulge, LiesWithinItsBounds) {
       std::vector<double> v(inside.size()), c(inside.size());
       std::vector<Vec3> g(inside.size());
       field.evaluate(inside, v, g);
-      claim.evaluate(inside, c);
-      const Interval bound = field.bound(box), claim_bound = claim.bound(box);
+      pressure.evaluate(inside, c);
+      const Interval bound = field.bound(box), pressure_bound = pressure.bound(box);
       const double slope = field.gradient_bound(box);
       for (std::size_t k = 0; k < inside.size(); ++k) {
         EXPECT_GE(v[k], bound.lower - 1e-12);
         EXPECT_LE(v[k], bound.upper + 1e-12);
-        EXPECT_GE(c[k], claim_bound.lower - 1e-8);
-        EXPECT_LE(c[k], claim_bound.upper + 1e-8);
+        EXPECT_GE(c[k], pressure_bound.lower - 1e-8);
+        EXPECT_LE(c[k], pressure_bound.upper + 1e-8);
         EXPECT_LE(g[k].norm(), slope * (1.0 + 1e-12));
         if (v[k] > 0.0) {
           EXPECT_TRUE(field.surface_box().contains(inside[k]));
@@ -258,12 +258,12 @@ struct LinearPair {
     stage.add(right, {right.centre}, modulus).samples = &samples[1];
     stage.solve();
   }
-  /// What the left claim has beyond its pressure at the distance x outside the right sphere, in a direction off the contact.
+  /// What the left deformed pressure has beyond its pressure at the distance x outside the right sphere, in a direction off the contact.
   [[nodiscard]] double lift(double x, const BulgeSettings& settings) {
-    const ClaimField claim(stage.bodies(), 0, stage.surface, settings);
+    const DeformedPressure pressure(stage.bodies(), 0, stage.surface, settings);
     const Vec3 at = right.centre + (1.0 + x) * Vec3(-0.6, 0.8, 0.0);
-    const double value = implicit::FieldView(claim).value(at);
-    EXPECT_LE(value, claim.bound(Box{at, at}).upper + 1e-12);
+    const double value = implicit::FieldView(pressure).value(at);
+    EXPECT_LE(value, pressure.bound(Box{at, at}).upper + 1e-12);
     return value - stage.bodies()[0].field.value(at);
   }
 };
@@ -305,21 +305,21 @@ TEST(LiteralBulge, EndsBelowHalfOfWhatWouldFillTheSpaceAround) {
   stage.add(right.field, right.centre, 1e7);
   stage.solve();
   ASSERT_EQ(stage.surface.summary.size(), 1u);
-  const ClaimField claim(stage.bodies(), 0, stage.surface, {.width = 1.0, .literal = true});
+  const DeformedPressure pressure(stage.bodies(), 0, stage.surface, {.width = 1.0, .literal = true});
   const Vec3 behind(0.42 + 0.454202019 + 0.05, 0, 0);
-  EXPECT_NEAR(implicit::FieldView(claim).value(behind), -0.25 * 1e4, 1e-9 * 1e4);
+  EXPECT_NEAR(implicit::FieldView(pressure).value(behind), -0.25 * 1e4, 1e-9 * 1e4);
 }
 
-TEST(LiteralBulge, MayClaimAPointForTwoBodies) {
-  // Between equal spheres both pressures are -x where both claims are h(x) - x, which is positive near 0 for a0 > w / 3.
+TEST(LiteralBulge, MayHoldAPointForTwoBodies) {
+  // Between equal spheres both pressures are -x where both deformed pressures are h(x) - x, which is positive near 0 for a0 > w / 3.
   LinearPair pair(0.4, 1.0);
   const auto both = [&](const BulgeSettings& settings) {
     const double x = 0.01, y = std::sqrt((1.0 + x) * (1.0 + x) - 0.8 * 0.8);
     const Vec3 at(0.8, y, 0.0);
     double least = 1.0;
     for (const std::uint32_t i : {0u, 1u}) {
-      const ClaimField claim(pair.stage.bodies(), i, pair.stage.surface, settings);
-      least = std::min(least, implicit::FieldView(claim).value(at));
+      const DeformedPressure pressure(pair.stage.bodies(), i, pair.stage.surface, settings);
+      least = std::min(least, implicit::FieldView(pressure).value(at));
     }
     return least;
   };
@@ -327,15 +327,15 @@ TEST(LiteralBulge, MayClaimAPointForTwoBodies) {
   EXPECT_LE(both({.attenuation = 0.8, .width = 0.1}), 1e-12);
 }
 
-// A claim is the same as long as its body, the bodies that it bulges around or gives way to, and the bulges are.
-TEST(ClaimField, HasTheContentOfAllThatItDependsOn) {
+// A deformed pressure is the same as long as its body, the bodies that it bulges around or gives way to, and the bulges are.
+TEST(DeformedPressure, HasTheContentOfAllThatItDependsOn) {
   Touching t;
   Blobs far{{Vec3(9, 0, 0)}, 1.0};
   t.stage.add(far.field, far.centre, 1e4);
   std::vector<std::uint64_t> field{10, 11, 12};
   const auto content = [&](double attenuation) {
     ContentWords words;
-    ClaimField(t.stage.bodies(), 0, t.stage.surface, {.attenuation = attenuation}).add_content([&](std::uint32_t body) { return field[body]; }, words);
+    DeformedPressure(t.stage.bodies(), 0, t.stage.surface, {.attenuation = attenuation}).add_content([&](std::uint32_t body) { return field[body]; }, words);
     return std::vector<std::uint64_t>(words.view().begin(), words.view().end());
   };
   const std::vector<std::uint64_t> bulging = content(0.01), plain = content(0.0);
@@ -357,8 +357,8 @@ TEST(ClaimField, HasTheContentOfAllThatItDependsOn) {
   EXPECT_EQ(content(0.0), plain);
 }
 
-TEST(ClaimField, IsContinuousWhereBulgesOfSeveralBodiesMeet) {
-  // Steps of 1e-5 change a claim by at most its slope times the step: no jump at any surface.
+TEST(DeformedPressure, IsContinuousWhereBulgesOfSeveralBodiesMeet) {
+  // Steps of 1e-5 change a deformed pressure by at most its slope times the step: no jump at any surface.
   const Blobs centre({Vec3::Zero()}, 1.0), right({Vec3(0.8, 0, 0)}, 1.0), top({Vec3(0.35, 0.78, 0)}, 1.0);
   Stage stage;
   stage.add(centre.field, centre.centre, 1e4);
@@ -366,8 +366,8 @@ TEST(ClaimField, IsContinuousWhereBulgesOfSeveralBodiesMeet) {
   stage.add(top.field, top.centre, 2e4);
   stage.solve({.error = 1e-3});
   ASSERT_EQ(stage.surface.summary.size(), 3u);
-  const ClaimField claim(stage.bodies(), 0, stage.surface, {.attenuation = 0.8, .width = 0.5});
-  const double limit = claim.gradient_bound(Box{Vec3::Constant(-2), Vec3::Constant(2)});
+  const DeformedPressure pressure(stage.bodies(), 0, stage.surface, {.attenuation = 0.8, .width = 0.5});
+  const double limit = pressure.gradient_bound(Box{Vec3::Constant(-2), Vec3::Constant(2)});
   std::mt19937_64 engine(11);
   const auto uniform = [&] { return 2.0 * static_cast<double>(engine() >> 11) * 0x1p-53 - 1.0; };
   for (int line = 0; line < 20; ++line) {
@@ -376,7 +376,7 @@ TEST(ClaimField, IsContinuousWhereBulgesOfSeveralBodiesMeet) {
     std::vector<Vec3> points;
     for (int i = 0; i <= 2000; ++i) points.push_back(from + i / 2000.0 * (to - from));
     std::vector<double> values(points.size());
-    claim.evaluate(points, values);
+    pressure.evaluate(points, values);
     const double step = (to - from).norm() / 2000.0;
     for (std::size_t i = 1; i < values.size(); ++i) EXPECT_LE(std::abs(values[i] - values[i - 1]), limit * step * 1.0001);
   }

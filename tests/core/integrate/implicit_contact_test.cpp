@@ -67,7 +67,8 @@ struct Punch {
     const Executor executor(1);
     InteractionWorkspace pairs(p.set, interactions);
     const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-      accumulate_interactions(p.set, state, interactions, t, executor, pairs, out.internal, out.external);
+      accumulate_interactions(p.set, state, interactions, executor, pairs, out.internal);
+      add_external_loads(p.set, interactions, t, out.external);
     };
     for (int k = 0; k < steps; ++k) {
       const StepReport report = advance(settings, {p.set, interactions, forces, &contact}, time, dt, {p.state, kick, ledger},

@@ -29,7 +29,8 @@ struct System {
     const Executor executor(threads);
     InteractionWorkspace workspace(p.set, interactions);
     const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-      accumulate_interactions(p.set, state, interactions, t, executor, workspace, out.internal, out.external);
+      accumulate_interactions(p.set, state, interactions, executor, workspace, out.internal);
+      add_external_loads(p.set, interactions, t, out.external);
     };
     run(forces, dt, steps);
   }
@@ -254,7 +255,8 @@ TEST(Steps, AllocateNothingAfterTheFirst) {
   const Executor executor(1);
   InteractionWorkspace workspace(s.p.set, s.interactions);
   const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-    accumulate_interactions(s.p.set, state, s.interactions, t, executor, workspace, out.internal, out.external);
+    accumulate_interactions(s.p.set, state, s.interactions, executor, workspace, out.internal);
+    add_external_loads(s.p.set, s.interactions, t, out.external);
   };
   s.run(forces, 1e-3, 1);
   const std::uint64_t before = supple::test::allocation_count();

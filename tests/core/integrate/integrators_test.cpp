@@ -32,7 +32,8 @@ struct System {
     const Executor executor(threads);
     InteractionWorkspace pairs(p.set, interactions);
     const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-      accumulate_interactions(p.set, state, interactions, t, executor, pairs, out.internal, out.external);
+      accumulate_interactions(p.set, state, interactions, executor, pairs, out.internal);
+      add_external_loads(p.set, interactions, t, out.external);
     };
     run(forces, dt, steps, executor, pairs);
   }
@@ -227,7 +228,8 @@ TEST(SymplecticMethod, IsVelocityVerletToTheBitByDefault) {
   const Executor executor(1);
   InteractionWorkspace pairs(plain.p.set, plain.interactions);
   const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-    accumulate_interactions(plain.p.set, state, plain.interactions, t, executor, pairs, out.internal, out.external);
+    accumulate_interactions(plain.p.set, state, plain.interactions, executor, pairs, out.internal);
+    add_external_loads(plain.p.set, plain.interactions, t, out.external);
   };
   for (int k = 0; k < 50; ++k) {
     advance({plain.p.set, plain.interactions, forces}, k * 1e-3, 1e-3, {plain.p.state, plain.kick, plain.ledger});
@@ -393,7 +395,8 @@ TEST_P(ExplicitMethod, AllocatesNothingAfterTheFirstStep) {
   const Executor executor(1);
   InteractionWorkspace pairs(s.p.set, s.interactions);
   const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-    accumulate_interactions(s.p.set, state, s.interactions, t, executor, pairs, out.internal, out.external);
+    accumulate_interactions(s.p.set, state, s.interactions, executor, pairs, out.internal);
+    add_external_loads(s.p.set, s.interactions, t, out.external);
   };
   s.run(forces, 1e-3, 1, executor, pairs);
   const std::uint64_t before = supple::test::allocation_count();
@@ -545,7 +548,8 @@ TEST_P(ImplicitMethod, KeepsItsOrderWithForcesOutsideThePairLaws) {
     const Executor executor(1);
     InteractionWorkspace pairs(s.p.set, s.interactions);
     const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-      accumulate_interactions(s.p.set, state, s.interactions, t, executor, pairs, out.internal, out.external);
+      accumulate_interactions(s.p.set, state, s.interactions, executor, pairs, out.internal);
+      add_external_loads(s.p.set, s.interactions, t, out.external);
       const Vec3 pull = 1.5 * (state.position[1] - state.position[0]);
       out.internal.force[0] += pull;
       out.internal.force[1] -= pull;

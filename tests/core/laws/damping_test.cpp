@@ -245,7 +245,8 @@ TEST(StiffnessDamping, GivesABondTheRatioOfItsFrequency) {
     const Executor executor(1);
     InteractionWorkspace pairs(d.p.set, d.interactions);
     const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-      accumulate_interactions(d.p.set, state, d.interactions, t, executor, pairs, out.internal, out.external);
+      accumulate_interactions(d.p.set, state, d.interactions, executor, pairs, out.internal);
+      add_external_loads(d.p.set, d.interactions, t, out.external);
     };
     const double end = 2.0;
     const int steps = static_cast<int>(std::lround(end / dt));

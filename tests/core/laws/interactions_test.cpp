@@ -134,8 +134,8 @@ Evaluated evaluate_loads(const Particles& p, const Interactions& interactions, c
   result.internal.reset(p.set.size());
   result.external.reset(p.set.size());
   InteractionWorkspace workspace(p.set, interactions);
-  result.counts = accumulate_interactions(p.set, p.state, interactions, time, executor, workspace, result.internal,
-                                          result.external);
+  result.counts = accumulate_interactions(p.set, p.state, interactions, executor, workspace, result.internal);
+  add_external_loads(p.set, interactions, time, result.external);
   return result;
 }
 
@@ -349,8 +349,8 @@ TEST(Interactions, AllocateNothingAfterTheFirstCall) {
     const auto call = [&] {
       internal.reset(crowd.p.set.size());
       external.reset(crowd.p.set.size());
-      accumulate_interactions(crowd.p.set, crowd.p.state, crowd.interactions, 0.0, executor, workspace, internal,
-                              external);
+      accumulate_interactions(crowd.p.set, crowd.p.state, crowd.interactions, executor, workspace, internal);
+      add_external_loads(crowd.p.set, crowd.interactions, 0.0, external);
     };
     call();
     const std::uint64_t before = supple::test::allocation_count();
@@ -371,8 +371,8 @@ TEST(GeometricLaws, GiveTheSameBitsFromKeptPairsAndFromNewOnes) {
     Evaluated loads;
     loads.internal.reset(crowd.p.set.size());
     loads.external.reset(crowd.p.set.size());
-    accumulate_interactions(crowd.p.set, crowd.p.state, crowd.interactions, 0.5, executor, kept, loads.internal,
-                            loads.external);
+    accumulate_interactions(crowd.p.set, crowd.p.state, crowd.interactions, executor, kept, loads.internal);
+    add_external_loads(crowd.p.set, crowd.interactions, 0.5, loads.external);
     ASSERT_EQ(hash_of(loads), hash_of(evaluate_loads(crowd.p, crowd.interactions, executor))) << step;
   }
 }
@@ -399,7 +399,8 @@ TEST(GeometricLaws, KeepTheEnergyOfAMelt) {
   const auto forces = [&] {
     loads.reset(p.set.size());
     external.reset(p.set.size());
-    accumulate_interactions(p.set, p.state, all, 0.0, Executor(1), workspace, loads, external);
+    accumulate_interactions(p.set, p.state, all, Executor(1), workspace, loads);
+    add_external_loads(p.set, all, 0.0, external);
   };
   const auto energy = [&] {
     double sum = potential_energy(p.set, p.state, all);

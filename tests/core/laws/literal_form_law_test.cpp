@@ -117,7 +117,8 @@ TEST(LiteralForm, ActsInAStepAndInReports) {
   external.reset(2);
   InteractionWorkspace workspace(p.set, all);
   const InteractionCounts counts =
-      accumulate_interactions(p.set, p.state, all, 0.0, Executor(1), workspace, internal, external);
+      accumulate_interactions(p.set, p.state, all, Executor(1), workspace, internal);
+      add_external_loads(p.set, all, 0.0, external);
   EXPECT_EQ(counts.pairs_present, 1U);
   const LiteralFormLoad load = evaluate(all.literal_form[0].law[0], test::pair_pose(p, 0, 1));
   EXPECT_EQ(internal.force[0], load.force_a);

@@ -122,7 +122,7 @@ TEST_F(GridFiles, OfBodiesThatTouchEndWhereTheyDo) {
     EXPECT_NEAR(right.interpolate(Vec3(0.0, y, 0.0)), 0.0, 1e-6);
     EXPECT_NEAR(left.interpolate(Vec3(-0.02, y, 0.0)), -0.02, 1e-3);
     EXPECT_NEAR(right.interpolate(Vec3(-0.02, y, 0.0)), 0.02, 1e-3);
-    EXPECT_NEAR(left.interpolate(Vec3(-0.04, y, 0.0)), -0.04, 2e-3);  // where the right drop claims nothing
+    EXPECT_NEAR(left.interpolate(Vec3(-0.04, y, 0.0)), -0.04, 2e-3);  // where the right drop deformed pressures nothing
     EXPECT_LT(both.interpolate(Vec3(0.0, y, 0.0)), -0.01);  // nothing parts their union
   }
 }

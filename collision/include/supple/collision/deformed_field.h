@@ -38,7 +38,7 @@ struct BulgeSettings {
   /// along grad p_j, k = |grad p_j| where that path ends, and w is `width` times the feature size of j, or of the body
   /// itself where j has none, whatever a0. Its defects: the bulge pops up at first touch (2 k w / 27 for a0 = 0), rises
   /// above a0 where w k > 6 a0, and grows with the stiffness of j, at most to half of what would fill the empty space
-  /// around the body; the bulges of two bodies may claim the same point, and those of several add up, in a third body too.
+  /// around the body; the bulges of two bodies may hold the same point, and those of several add up, in a third body too.
   bool literal = false;
 };
 
@@ -59,16 +59,16 @@ struct BulgeVolume {
 /// @param load  integral of p dA [N]   @param steepness  |grad(p_A - p_B)| [Pa/m]
 [[nodiscard]] double volume_keeping_height(double displaced, double area, double load, double steepness, double width) noexcept;
 
-/// The claim of body i on space: p^_i = p_i inside every other body, p_i + h(...) outside (the bulge around each body
-/// that it touches), in Pa. Space goes to the largest positive claim, so body i with its contacts is
-/// {p^_i > 0, p^_i >= p^_j}: claims are what polygonise_partition takes. The bulge uses -p_j as its coordinate (k = 1):
-/// h <= -p_j there, so two bulges can never claim the same point, and the C^1 join with the compression is exact. Where
-/// several bodies are near, the sum of the bulges is limited to the smallest -p_m of all of them: claims stay continuous
+/// The deformed pressure of body i: p^_i = p_i inside every other body, p_i + h(...) outside (the bulge around each body
+/// that it touches), in Pa. Space goes to the largest positive one, so body i with its contacts is
+/// {p^_i > 0, p^_i >= p^_j}: deformed pressures are what polygonise_partition takes. The bulge uses -p_j as its coordinate (k = 1):
+/// h <= -p_j there, so two bulges can never hold the same point, and the C^1 join with the compression is exact. Where
+/// several bodies are near, the sum of the bulges is limited to the smallest -p_m of all of them: deformed pressures stay continuous
 /// across every surface and no bulge enters a third body. `BulgeSettings::literal` has neither.
-class ClaimField {
+class DeformedPressure {
  public:
-  /// @param body  index of the claimant in `bodies`; views are kept, so everything must outlive this
-  ClaimField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
+  /// @param body  index of the body in `bodies`; views are kept, so everything must outlive this
+  DeformedPressure(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
              const BulgeSettings& settings);
   void evaluate(std::span<const Vec3> points, std::span<double> values) const;
   void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
@@ -78,7 +78,7 @@ class ClaimField {
   [[nodiscard]] Box surface_box() const;
   [[nodiscard]] double feature_size() const;
   [[nodiscard]] std::span<const BulgeVolume> volumes() const { return volumes_; }  ///< of `BulgeSettings::keep_volume`, else none
-  /// All that the claim depends on, bit by bit. @param field  a number for the field of a body, by index in `bodies`: equal ones mean
+  /// All that the deformed pressure depends on, bit by bit. @param field  a number for the field of a body, by index in `bodies`: equal ones mean
   /// equal fields
   void add_content(const std::function<std::uint64_t(std::uint32_t)>& field, ContentWords& words) const;
 
@@ -92,7 +92,7 @@ class ClaimField {
   void keep_volumes(std::span<const WantedBulge> wanted);
   void find_limiting();
   /// Values, and gradients where `gradients` is not empty.
-  void evaluate_claims(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
+  void evaluate_at(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
   /// What the literal bulge around a neighbour adds in a box at most [Pa]
   [[nodiscard]] double literal_rise(const Neighbour& neighbour, const Box& box) const;
 
@@ -105,7 +105,7 @@ class ClaimField {
   double highest_ = 0.0;                 ///< of one bulge; not where volumes are kept [Pa]
   double together_ = std::numeric_limits<double>::infinity();  ///< all bulges are cut off there [Pa]
   double rise_ = 0.0;                    ///< largest possible sum of the bulges [Pa]
-  Box box_;                              ///< of {claim >= 0}
+  Box box_;                              ///< of {deformed pressure >= 0}
 };
 
 /// The deformed field itself: F~_i = (p^_i - max over j of max(p^_j, 0)) / P_i: iso surfaces of touching bodies coincide.
@@ -113,8 +113,8 @@ class DeformedField {
  public:
   DeformedField(std::span<const ContactBody> bodies, std::uint32_t body, const ContactSurface& surface,
                 const BulgeSettings& settings);
-  /// What `others` leave of a claim. @param modulus  P_i [Pa], > 0
-  DeformedField(ClaimField own, std::vector<ClaimField> others, double modulus)
+  /// What `others` leave of a deformed pressure. @param modulus  P_i [Pa], > 0
+  DeformedField(DeformedPressure own, std::vector<DeformedPressure> others, double modulus)
       : own_(std::move(own)), others_(std::move(others)), modulus_(modulus) {}
   void evaluate(std::span<const Vec3> points, std::span<double> values) const;
   void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
@@ -125,18 +125,18 @@ class DeformedField {
   [[nodiscard]] double feature_size() const;
 
  private:
-  ClaimField own_;
-  std::vector<ClaimField> others_;
+  DeformedPressure own_;
+  std::vector<DeformedPressure> others_;
   double modulus_;
 };
 
-/// How deep a point lies in the body with its contacts, to first order [m]: the least of p^ / |grad p^| of its own claim and
+/// How deep a point lies in the body with its contacts, to first order [m]: the least of p^ / |grad p^| of its own deformed pressure and
 /// of (p^ - p^_j) / |grad (p^ - p^_j)| against every other's. Unlike F~ / |grad F~| it knows the contact surface also where the
-/// other claims nothing, and is no deeper there than that is far; > 0 inside, of slope 1.
+/// other holds nothing, and is no deeper there than that is far; > 0 inside, of slope 1.
 class DeformedDepth {
  public:
-  /// @param others  claims of bodies that touch this one
-  DeformedDepth(ClaimField own, std::vector<ClaimField> others) : own_(std::move(own)), others_(std::move(others)) {}
+  /// @param others  deformed pressures of bodies that touch this one
+  DeformedDepth(DeformedPressure own, std::vector<DeformedPressure> others) : own_(std::move(own)), others_(std::move(others)) {}
   void evaluate(std::span<const Vec3> points, std::span<double> values) const;
   /// Gradients are unit vectors, or 0 where none is.
   void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const;
@@ -147,8 +147,8 @@ class DeformedDepth {
   [[nodiscard]] double feature_size() const { return own_.feature_size(); }
 
  private:
-  ClaimField own_;
-  std::vector<ClaimField> others_;
+  DeformedPressure own_;
+  std::vector<DeformedPressure> others_;
 };
 
 }  // namespace supple::collision

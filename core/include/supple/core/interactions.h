@@ -170,12 +170,15 @@ class InteractionWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Stage 1. Adds the conservative pair loads to `internal` and gravity and the external loads at `time` to `external`
-/// (not friction and not medium damping: those are part of `advance`). Deterministic: each particle gathers its pairs in
-/// a fixed order. @pre both are sized to the particles
+/// Stage 1. Adds the conservative pair loads (not friction and not medium damping: those are part of `advance`).
+/// Deterministic: each particle gathers its pairs in a fixed order. @pre `loads` is sized to the particles
 InteractionCounts accumulate_interactions(const ParticleSet& set, const ParticleState& state,
-                                          const Interactions& interactions, double time, const Executor& executor,
-                                          InteractionWorkspace& workspace, Loads& internal, Loads& external);
+                                          const Interactions& interactions, const Executor& executor,
+                                          InteractionWorkspace& workspace, Loads& loads);
+
+/// Adds gravity and the external loads of the moment `time` or, where `load_span` has an extent, their means over it.
+/// @pre `external` is sized to the particles
+void add_external_loads(const ParticleSet& set, const Interactions& interactions, double time, Loads& external);
 
 /// Gravity and the external loads, as means over [from, to] or, where both are one, of that moment; replaces the loads.
 void external_loads(const ParticleSet& set, const Interactions& interactions, double from, double to, Loads& external);

@@ -1,9 +1,9 @@
 /// @file supple/implicit/missed_pieces.h
 /// Pieces of surfaces that a lattice misses: closed pieces around no node, cavities in a body and islands beside it or in another body that
-/// lie between the nodes. Each point belongs to the body with the largest claim, or to outside where all claims are below 0. Within a piece the
-/// lead of its claim over all others has a maximum, of one continuous function over space (claim_bounds.h). So cubes are halved until bounds
+/// lie between the nodes. Each point belongs to the body with the largest weighted field, or to outside where all weighted fields are below 0. Within a piece the
+/// lead of its weighted field over all others has a maximum, of one continuous function over space (weighted_bounds.h). So cubes are halved until bounds
 /// prove that a cube belongs to one label, or that there is no such maximum in it: for a single body because its gradient does not vanish, for several
-/// because there is a direction along which the claim of each possible label rises more than all others, or because a line to outside passes convex
+/// because there is a direction along which the weighted field of each possible label rises more than all others, or because a line to outside passes convex
 /// shapes. The remaining cubes have pieces nearby or are undecided.
 #pragma once
 
@@ -33,7 +33,7 @@ struct MissedPieces {
 /// have the signs of F in double precision. @throws Error{Limit} when the lattice has too many blocks, see find_surface_blocks.
 MissedPieces add_missed_pieces(const Field& field, const Lattice& lattice, const Executor& executor, Mesh& mesh);
 
-/// A body that divides space with others: its claim is weight * F, and a point belongs to the body with the largest claim above 0.
+/// A body that divides space with others: its weighted field is weight * F, and a point belongs to the body with the largest weighted field above 0.
 struct SearchedBody {
   const Field* field = nullptr;
   double weight = 1.0;  ///< > 0

@@ -127,8 +127,7 @@ class BlobSampler final : public Sampler {
     }
     (void)blobs::select(work.around_leaf, centre_of(corner_of(tile), kTile),
                         0.5F * kTile + static_cast<float>(kAround), work.tile);
-    blobs::project_points(work.tile, iso_, placement_of(block), points.data()->data(), normals.data()->data(),
-                          points.size(), work.near);
+    blobs::project_points(work.tile, iso_, placement_of(block), {points.data()->data(), normals.data()->data(), points.size()}, work.near);
     const Cells base = block.base();
     const auto corner = corner_of(tile);
     for (const int end : {-kAround, kTile + kAround}) {
@@ -211,8 +210,8 @@ class BlobSampler final : public Sampler {
     std::size_t begin = 0, to = 0;  // of the vertices that follow each other without a gap
     const auto place_run = [&] {
       if (edges.count == begin) return;
-      blobs::place_vertices(edges, begin, edges.count, placement, mesh.position[to].data(), mesh.normal[to].data(),
-                            &points[block.first_point + (to - block.first_vertex)].t);
+      blobs::place_vertices(edges, begin, edges.count, placement,
+                            {mesh.position[to].data(), mesh.normal[to].data(), &points[block.first_point + (to - block.first_vertex)].t});
     };
     for_bits(wanted, [&](unsigned place) {
       const std::size_t rank = block.rank(place), first = edges.count;

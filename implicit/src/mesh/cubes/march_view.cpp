@@ -21,10 +21,12 @@ constexpr std::size_t kBlocksPerTask = 8;
 /// Vertices stay this far from the nodes [cells].
 constexpr double kLeast = 0x1p-17;
 
-Vec3 position_of(const Lattice& lattice, const Block& block, int x, int y, int z, int axis, double t) {
+/// The point at t along the edge that leaves a node of the block along an axis.
+Vec3 position_of(const Lattice& lattice, const Block& block, const std::array<int, 3>& node, int axis, double t) {
   const Cells base = block.base();
-  Vec3 p = lattice::node_position(lattice, base[0] + x, base[1] + y, base[2] + z);
-  const double at = static_cast<double>(base[static_cast<std::size_t>(axis)] + std::array{x, y, z}[static_cast<std::size_t>(axis)]) + t;
+  Vec3 p = lattice::node_position(lattice, base[0] + node[0], base[1] + node[1], base[2] + node[2]);
+  const auto k = static_cast<std::size_t>(axis);
+  const double at = static_cast<double>(base[k] + node[k]) + t;
   p[axis] = lattice.origin[axis] + lattice.cell * at;
   return p;
 }
@@ -185,8 +187,8 @@ class ViewSampler final : public Sampler {
         });
       };
       for_edges([&](int x, int y, int z, int axis) {
-        const Vec3 start = position_of(lattice_, block, x, y, z, axis, 0.0);
-        const Vec3 end = position_of(lattice_, block, x, y, z, axis, 1.0);
+        const Vec3 start = position_of(lattice_, block, {x, y, z}, axis, 0.0);
+        const Vec3 end = position_of(lattice_, block, {x, y, z}, axis, 1.0);
         const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
         const double f0 = static_cast<double>(value_at(table, block, x, y, z));
         const double f1 = upper_value(static_cast<double>(value_at(table, block, x + dx, y + dy, z + dz)), f0, end);
@@ -196,13 +198,13 @@ class ViewSampler final : public Sampler {
       roots.solve(field_, {}, scale);
       std::size_t i = 0, vertex = block.first_vertex + tile.first_vertex, to = block.first_point + tile.first_vertex;
       for_edges([&](int x, int y, int z, int axis) {
-        const Vec3 start = position_of(lattice_, block, x, y, z, axis, 0.0);
-        const Vec3 end = position_of(lattice_, block, x, y, z, axis, 1.0);
+        const Vec3 start = position_of(lattice_, block, {x, y, z}, axis, 0.0);
+        const Vec3 end = position_of(lattice_, block, {x, y, z}, axis, 1.0);
         Vec3 place = roots.point(i);
         double t = (place[axis] - start[axis]) / (end[axis] - start[axis]);
         if (!(t >= kLeast && t <= 1.0 - kLeast)) {
           t = std::clamp(t, kLeast, 1.0 - kLeast);
-          place = position_of(lattice_, block, x, y, z, axis, t);
+          place = position_of(lattice_, block, {x, y, z}, axis, t);
         }
         const bool inside = value_at(table, block, x, y, z) > 0.0F;
         const Vec3 normal = lattice::outward(roots.gradient(i), inside ? Vec3(end - start) : Vec3(start - end));

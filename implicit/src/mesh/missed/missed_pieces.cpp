@@ -11,7 +11,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "bounds/claim_bounds.h"
+#include "bounds/weighted_bounds.h"
 #include "bounds/eighth_bounds.h"
 #include "mesh/cubes/march_cases.h"
 #include "mesh/missed/missed_blobs.h"
@@ -73,7 +73,7 @@ struct Seed {
 
 class Labels {
  public:
-  Labels(std::span<const Claim> claims, const Lattice& fine) : claims_(claims), fine_(fine) {}
+  Labels(std::span<const WeightedField> weighted, const Lattice& fine) : weighted_(weighted), fine_(fine) {}
   /// Whose the nodes are; valid until the next call. @param candidates  ascending
   const std::vector<Label>& operator()(std::span<const Node> nodes, std::span<const std::uint32_t> candidates) {
     points_.clear();
@@ -82,7 +82,7 @@ class Labels {
     best_.assign(nodes.size(), 0.0);
     values_.resize(nodes.size());
     for (const std::uint32_t body : candidates) {
-      claims_[body].evaluate(points_, values_);
+      weighted_[body].evaluate(points_, values_);
       for (std::size_t i = 0; i < values_.size(); ++i) {
         if (!(values_[i] > best_[i])) continue;
         best_[i] = values_[i];
@@ -93,7 +93,7 @@ class Labels {
   }
 
  private:
-  std::span<const Claim> claims_;
+  std::span<const WeightedField> weighted_;
   const Lattice& fine_;
   std::vector<Vec3> points_;
   std::vector<double> values_, best_;
@@ -103,9 +103,9 @@ class Labels {
 /// Searches for extrema in a block of 8^3 cells. Cubes are measured in the smallest of them.
 class BlockSearch {
  public:
-  BlockSearch(std::span<const Claim> claims, const Lattice& fine)
-      : claims_(claims), unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, bounds_(claims), labels_(claims, fine),
-        by_eighths_(claims.size() == 1 && EighthBounds::know(claims[0].field())) {}
+  BlockSearch(std::span<const WeightedField> weighted, const Lattice& fine)
+      : weighted_(weighted), unit_{.origin = fine.origin, .cell = fine.cell / kUnits}, bounds_(weighted), labels_(weighted, fine),
+        by_eighths_(weighted.size() == 1 && EighthBounds::know(weighted[0].field())) {}
 
   /// @param bodies  that may have a part of the block  @param reaching  all whose supports may reach it
   void search(const lattice::BlockCoord& block, std::span<const std::uint32_t> bodies, std::span<const std::uint32_t> reaching,
@@ -113,7 +113,7 @@ class BlockSearch {
     bodies_ = bodies;
     seeds_ = &seeds;
     counts_ = &counts;
-    find_candidates(claims_, box_of(lowest_of(block), kEdge), reaching, candidates_[0]);
+    find_candidates(weighted_, box_of(lowest_of(block), kEdge), reaching, candidates_[0]);
     by_eighths_ ? halve(lowest_of(block), kEdge, 0) : search_eighths(lowest_of(block), kEdge, 0);
   }
 
@@ -124,7 +124,7 @@ class BlockSearch {
     seeds_ = &seeds;
     counts_ = &counts;
     const Node low = lowest_of(open.block);
-    find_candidates(claims_, box_of(low, kEdge), bodies_, candidates_[kLevels - 2]);
+    find_candidates(weighted_, box_of(low, kEdge), bodies_, candidates_[kLevels - 2]);
     for (const auto& [x, y, z] : open.cell) search_cell(stepped(low, kCell * x, kCell * y, kCell * z));
   }
 
@@ -139,7 +139,7 @@ class BlockSearch {
   /// search_eighths for a single body, eight cubes side by side; the remaining cells are processed with all bounds.
   void halve(const Node& at, int edge, std::size_t level) {
     EighthBounds& bounds = eighths_[level];
-    const unsigned settled = bounds(claims_[0].field(), box_of(at, edge), candidates_[level].primitive).settled();
+    const unsigned settled = bounds(weighted_[0].field(), box_of(at, edge), candidates_[level].primitive).settled();
     counts_->cubes += 8;
     for (unsigned c = 0; c < 8; ++c) {
       if ((settled >> c & 1u) != 0) continue;
@@ -268,7 +268,7 @@ class BlockSearch {
     return {lattice::node_position(unit_, at[0], at[1], at[2]), lattice::node_position(unit_, at[0] + edge, at[1] + edge, at[2] + edge)};
   }
 
-  std::span<const Claim> claims_;
+  std::span<const WeightedField> weighted_;
   Lattice unit_;
   CubeBounds bounds_;
   Labels labels_;
@@ -285,19 +285,24 @@ class BlockSearch {
   std::vector<Node> way_;
 };
 
-enum class Flood { Closed, Joined, Known, Several, TooLarge };
+struct Flood {
+  enum class End { Closed, Joined, Known, Several, TooLarge };
+  End end;
+  Label beyond;   ///< the label around the nodes
+  Node coarse{};  ///< where it joined, the node of the coarse lattice
+};
 
 /// The nodes of one label that are connected to a seed: those of a body along edges, those outside across faces of cells too, as in
 /// march_cases.h. Stops at a node of the coarse lattice or of another part.
-/// @param beyond  the label around them; Several where there are more  @param end  the node of the coarse lattice
-Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels,
-    NodeSet& part, Label& beyond, Node& end) {
+/// @param part  its nodes
+Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_t> bodies, Labels& labels, NodeSet& part) {
+  using enum Flood::End;
   // by steps to the nearest node of the coarse lattice: those near it first
   std::array<std::vector<Node>, kFarthest + 1> front;
   std::vector<Node> from, next;
   NodeSet other;
   bool several = false;
-  beyond = seed.label;
+  Label beyond = seed.label;
   part.insert(seed.node);
   front[steps_to_coarse(seed.node)].push_back(seed.node);
   for (auto nearest = front.begin(); nearest != front.end();) {
@@ -309,11 +314,8 @@ Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_
     from.swap(*nearest);
     next.clear();
     for (const Node& node : from) {
-      if (known.contains(node)) return Flood::Known;
-      if (is_coarse(node)) {
-        end = node;
-        return Flood::Joined;
-      }
+      if (known.contains(node)) return {Known, beyond};
+      if (is_coarse(node)) return {Joined, beyond, node};
       for (int step = 0; step < 27; ++step) {
         const int x = step % 3 - 1, y = step / 3 % 3 - 1, z = step / 9 - 1;
         const int far = std::abs(x) + std::abs(y) + std::abs(z);
@@ -334,12 +336,12 @@ Flood flood(const Seed& seed, const NodeSet& known, std::span<const std::uint32_
       front[steps_to_coarse(next[i])].push_back(next[i]);
     }
     nearest = front.begin();
-    if (part.size() > kMostNodes) return Flood::TooLarge;
+    if (part.size() > kMostNodes) return {TooLarge, beyond};
   }
-  return several ? Flood::Several : Flood::Closed;
+  return {several ? Several : Closed, beyond};
 }
 
-/// The crossed edges around one piece, as they are requested, and the roots of its claim's difference to that around it.
+/// The crossed edges around one piece, as they are requested, and the roots of its weighted field's difference to that around it.
 class PieceVertices {
  public:
   PieceVertices(const Lattice& fine, const FieldView& plus, const FieldView& minus) : fine_(fine), plus_(plus), minus_(minus) {}
@@ -393,7 +395,7 @@ class PieceVertices {
 };
 
 /// Marching cubes around the nodes of one piece, for the bodies on both sides of it.
-void add_piece(std::span<const Claim> claims, const Lattice& fine, const NodeSet& part, Label own, Label beyond, std::span<Mesh> meshes) {
+void add_piece(std::span<const WeightedField> weighted, const Lattice& fine, const NodeSet& part, Label own, Label beyond, std::span<Mesh> meshes) {
   std::vector<Node> cells;
   for (const Node& node : part) {
     for (unsigned c = 0; c < 8; ++c) cells.push_back(corner_of(node, c, -1));
@@ -402,7 +404,7 @@ void add_piece(std::span<const Claim> claims, const Lattice& fine, const NodeSet
   cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
   const bool body = own != 0;  // or a cavity in one
   const Label inner = body ? own : beyond, outer = body ? beyond : 0;
-  PieceVertices vertices(fine, claims[inner - 1], outer != 0 ? FieldView(claims[outer - 1]) : FieldView());
+  PieceVertices vertices(fine, weighted[inner - 1], outer != 0 ? FieldView(weighted[outer - 1]) : FieldView());
   std::vector<std::array<std::uint32_t, 3>> triangles;
   for (const Node& cell : cells) {
     unsigned corners = 0;
@@ -438,12 +440,12 @@ void add_piece(std::span<const Claim> claims, const Lattice& fine, const NodeSet
   if (outer != 0) add_to(meshes[outer - 1], false, inner);
 }
 
-/// For each block of a list, ascending, the claims whose supports may reach it: those of block i are claim[offset[i]] up to claim[offset[i + 1]].
+/// For each block of a list, ascending, the weighted fields whose supports may reach it: those of block i are weighted field[offset[i]] up to weighted field[offset[i + 1]].
 struct Reaching {
   std::vector<std::size_t> offset;
-  std::vector<std::uint32_t> claim;
+  std::vector<std::uint32_t> weighted_field;
 };
-Reaching find_reaching(std::span<const Claim> claims, const Lattice& lattice, std::span<const lattice::BlockCoord> blocks) {
+Reaching find_reaching(std::span<const WeightedField> weighted, const Lattice& lattice, std::span<const lattice::BlockCoord> blocks) {
   Box all;
   const auto corner = [&](const lattice::BlockCoord& at, int add) {
     return lattice::node_position(lattice, lattice::kCells * (std::int64_t{at[0]} + add), lattice::kCells * (std::int64_t{at[1]} + add),
@@ -451,8 +453,8 @@ Reaching find_reaching(std::span<const Claim> claims, const Lattice& lattice, st
   };
   for (const lattice::BlockCoord& at : blocks) all = all.united({corner(at, 0), corner(at, 1)});
   std::vector<std::vector<std::uint32_t>> reach(blocks.size());
-  for (std::uint32_t c = 0; c < claims.size(); ++c) {
-    const auto [low, high] = lattice::block_range(claims[c].support_box().intersection(all), lattice, 0);
+  for (std::uint32_t c = 0; c < weighted.size(); ++c) {
+    const auto [low, high] = lattice::block_range(weighted[c].support_box().intersection(all), lattice, 0);
     for (std::int32_t z = low[2]; z <= high[2]; ++z) {
       for (std::int32_t y = low[1]; y <= high[1]; ++y) {
         auto at = std::lower_bound(blocks.begin(), blocks.end(), lattice::BlockCoord{low[0], y, z}, lattice::before);
@@ -465,8 +467,8 @@ Reaching find_reaching(std::span<const Claim> claims, const Lattice& lattice, st
   Reaching found;
   found.offset.assign(1, 0);
   for (const std::vector<std::uint32_t>& some : reach) {
-    found.claim.insert(found.claim.end(), some.begin(), some.end());
-    found.offset.push_back(found.claim.size());
+    found.weighted_field.insert(found.weighted_field.end(), some.begin(), some.end());
+    found.offset.push_back(found.weighted_field.size());
   }
   return found;
 }
@@ -478,23 +480,23 @@ struct BlockSeeds {
 };
 
 /// Block by block, cubes one at a time.
-std::vector<BlockSeeds> search_blocks(std::span<const Claim> claims, const Lattice& lattice, const Lattice& fine,
+std::vector<BlockSeeds> search_blocks(std::span<const WeightedField> weighted, const Lattice& lattice, const Lattice& fine,
     const Executor& executor) {
   std::vector<FieldView> views;
   std::vector<Box> surface;
-  for (const Claim& claim : claims) {
-    views.emplace_back(claim);
-    surface.push_back(claim.surface_box());
+  for (const WeightedField& weighted_field : weighted) {
+    views.emplace_back(weighted_field);
+    surface.push_back(weighted_field.surface_box());
   }
   PolygoniseCounts blocks_looked_at;
   const lattice::BlockList blocks = lattice::find_label_blocks(views, surface, lattice, executor, kMostBlocks, blocks_looked_at);
-  const Reaching reaching = find_reaching(claims, lattice, blocks.block);
+  const Reaching reaching = find_reaching(weighted, lattice, blocks.block);
   std::vector<BlockSeeds> found(blocks.block.size());
   executor.for_blocks(found.size(), 1, [&](std::size_t begin, std::size_t end) {
-    BlockSearch search(claims, fine);
+    BlockSearch search(weighted, fine);
     for (std::size_t b = begin; b < end; ++b) {
       search.search(blocks.block[b], std::span(blocks.candidate).subspan(blocks.offset[b], blocks.offset[b + 1] - blocks.offset[b]),
-                    std::span(reaching.claim).subspan(reaching.offset[b], reaching.offset[b + 1] - reaching.offset[b]),
+                    std::span(reaching.weighted_field).subspan(reaching.offset[b], reaching.offset[b + 1] - reaching.offset[b]),
                     found[b].seeds, found[b].counts);
     }
   });
@@ -502,14 +504,14 @@ std::vector<BlockSeeds> search_blocks(std::span<const Claim> claims, const Latti
 }
 
 /// The same for a sum of Wyvill points: the cubes that remain open after processing many at a time.
-std::vector<BlockSeeds> search_blobs(const Field& field, std::span<const Claim> claims, const Lattice& lattice,
+std::vector<BlockSeeds> search_blobs(const Field& field, std::span<const WeightedField> weighted, const Lattice& lattice,
     const Lattice& fine, const Executor& executor) {
   std::uint64_t cubes = 0;
   const std::vector<OpenCells> open = find_open_cells(field, lattice, executor, cubes);
   std::vector<BlockSeeds> found(open.size() + 1);
   found.back().counts.cubes = cubes;
   executor.for_blocks(open.size(), 1, [&](std::size_t begin, std::size_t end) {
-    BlockSearch search(claims, fine);
+    BlockSearch search(weighted, fine);
     for (std::size_t b = begin; b < end; ++b) search.search(open[b], found[b].seeds, found[b].counts);
   });
   return found;
@@ -517,16 +519,16 @@ std::vector<BlockSeeds> search_blobs(const Field& field, std::span<const Claim> 
 
 MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lattice, const Executor& executor, std::span<Mesh> meshes) {
   const Lattice fine{.origin = lattice.origin, .cell = lattice.cell / kParts};
-  std::vector<Claim> claims;
-  for (const SearchedBody& body : bodies) claims.emplace_back(body);
+  std::vector<WeightedField> weighted;
+  for (const SearchedBody& body : bodies) weighted.emplace_back(body);
   const bool blobs = bodies.size() == 1 && is_sum_of_blobs(*bodies[0].field);
   const std::vector<BlockSeeds> blocks =
-      blobs ? search_blobs(*bodies[0].field, claims, lattice, fine, executor)
-          : search_blocks(claims, lattice, fine, executor);
+      blobs ? search_blobs(*bodies[0].field, weighted, lattice, fine, executor)
+          : search_blocks(weighted, lattice, fine, executor);
   std::vector<std::uint32_t> all(bodies.size());
   std::iota(all.begin(), all.end(), 0u);
   MissedPieces found;
-  Labels labels(claims, fine);
+  Labels labels(weighted, fine);
   NodeSet known;   // of parts that were processed
   NodeSet joined;  // where they met the coarse lattice
   for (const BlockSeeds& block : blocks) {
@@ -534,13 +536,12 @@ MissedPieces add_missed(std::span<const SearchedBody> bodies, const Lattice& lat
     found.cubes += block.counts.cubes;
     for (const Seed& seed : block.seeds) {
       NodeSet part;
-      Label beyond = 0;
-      Node node{};
-      const Flood end = flood(seed, known, all, labels, part, beyond, node);
-      if (end == Flood::Closed) add_piece(claims, fine, part, seed.label, beyond, meshes);
-      found.pieces += end == Flood::Closed ? 1 : 0;
-      found.joined += end == Flood::Joined && joined.insert(node).second ? 1 : 0;
-      found.undecided += end == Flood::TooLarge || end == Flood::Several ? 1 : 0;
+      const auto [end, beyond, node] = flood(seed, known, all, labels, part);
+      using enum Flood::End;
+      if (end == Closed) add_piece(weighted, fine, part, seed.label, beyond, meshes);
+      found.pieces += end == Closed ? 1 : 0;
+      found.joined += end == Joined && joined.insert(node).second ? 1 : 0;
+      found.undecided += end == TooLarge || end == Several ? 1 : 0;
       known.merge(part);
     }
   }

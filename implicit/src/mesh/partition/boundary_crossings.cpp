@@ -41,7 +41,7 @@ void BoundaryCrossings::find(const Executor& executor) {
       }
       const Label by = cover_a != nullptr ? cover_a->by : cover_b->by;
       if (facets_.side(facet, cover_a != nullptr ? b : a, by) != Side::Here) continue;
-      crossing_.push_back(lone_crossing(a, b, low, high, by, cover_b != nullptr, {block, facet.tetrahedron, face}));
+      crossing_.push_back(lone_crossing({a, b, low, high, by, cover_b != nullptr}, {block, facet.tetrahedron, face}));
     }
   }
   sort_crossings();
@@ -111,7 +111,8 @@ std::optional<std::uint32_t> BoundaryCrossings::crossing_for_others(std::uint32_
   return {};
 }
 
-Crossing BoundaryCrossings::lone_crossing(std::uint32_t a, std::uint32_t b, Label low, Label high, Label by, bool wins_at_b, const EdgePlace& at) const {
+Crossing BoundaryCrossings::lone_crossing(const LoneCover& cover, const EdgePlace& at) const {
+  const auto [a, b, low, high, by, wins_at_b] = cover;
   const std::uint32_t from = wins_at_b ? a : b, to = wins_at_b ? b : a;
   return {.a = a, .b = b, .labels = labels_of(std::array{low, high, by}), .block = at.block, .tetrahedron = at.tetrahedron, .face = at.face,
           .minus = low == 0 ? 0 : high, .plus = by, .here = facets_.place(from, low, high), .there = facets_.place(to, low, high)};
@@ -136,7 +137,7 @@ std::array<Crossing, 2> BoundaryCrossings::look_between(TwiceCovered& t) const {
   const auto whole = [&](std::uint32_t v, Label by) { return facets_.cover_of(v).between.has(by); };
   if (whole(t.a, t.at_b) || whole(t.b, t.at_a)) return points;  // what one end parts the other parts from more
   const EdgePlace at{t.block, t.tetrahedron, t.face};
-  points = {lone_crossing(t.a, t.b, t.low, t.high, t.at_a, false, at), lone_crossing(t.a, t.b, t.low, t.high, t.at_b, true, at)};
+  points = {lone_crossing({t.a, t.b, t.low, t.high, t.at_a, false}, at), lone_crossing({t.a, t.b, t.low, t.high, t.at_b, true}, at)};
   for (Crossing& c : points) solve(c);
   if (holds(points[0], t.at_b) && holds(points[1], t.at_a)) t.kind = TwiceCovered::Kind::Apart;
   return points;

@@ -78,8 +78,14 @@ class BoundaryCrossings {
     std::uint16_t tetrahedron;
     std::uint8_t face;
   };
-  /// The point from which a label is largest on the interface of two others, between vertices a and b.
-  [[nodiscard]] Crossing lone_crossing(std::uint32_t a, std::uint32_t b, Label low, Label high, Label by, bool wins_at_b, const EdgePlace& at) const;
+  /// Vertices a and b on the interface of two labels, and the label `by` that is largest at one of them.
+  struct LoneCover {
+    std::uint32_t a, b;
+    Label low, high, by;
+    bool wins_at_b;
+  };
+  /// The point of the interface from which the label is largest.
+  [[nodiscard]] Crossing lone_crossing(const LoneCover& cover, const EdgePlace& at) const;
   /// Where the labels that are largest at the ends meet on the interface with one more label, `beside`.
   [[nodiscard]] Crossing touching(const TwiceCovered& t, Label beside) const;
   /// The kind of split of an edge: both of its points are exact, and none of the four labels is larger there.

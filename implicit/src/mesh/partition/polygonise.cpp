@@ -153,7 +153,7 @@ void take_block(const FieldView& field, const Lattice& lattice, const BlockCoord
 
   work.roots.clear();
   for_edges(block.edges, [&](int x, int y, int z, unsigned mask) {
-    add_edge(x, y, z, mask, work.nodes, [&](int node) { return work.values[static_cast<std::size_t>(node)]; },
+    add_edge({x, y, z, mask}, work.nodes, [&](int node) { return work.values[static_cast<std::size_t>(node)]; },
              work.roots);
   });
   double scale = 0.0;

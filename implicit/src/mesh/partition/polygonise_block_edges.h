@@ -10,16 +10,22 @@
 
 namespace supple::implicit::lattice {
 
-/// Adds the edge (x, y, z) + mask of a block to `roots`; `value` gives f at a node index of the block.
+/// From the node (x, y, z) of a block to the next one along the axes in `mask`.
+struct BlockEdge {
+  int x, y, z;
+  unsigned mask;
+};
+
+/// Adds an edge of a block to `roots`; `value` gives f at a node index of the block.
 template <class Value>
-void add_edge(int x, int y, int z, unsigned mask, std::span<const Vec3> nodes, const Value& value, EdgeRoots& roots) {
+void add_edge(const BlockEdge& edge, std::span<const Vec3> nodes, const Value& value, EdgeRoots& roots) {
   constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-  const auto moves = [&](int axis) { return (mask >> axis & 1u) != 0; };
+  const auto moves = [&](int axis) { return (edge.mask >> axis & 1u) != 0; };
   const auto inside = [&](int steps) {  // is the node that many directions away in the block?
     const auto within = [&](int axis, int at) { return !moves(axis) || (at + steps >= 0 && at + steps < kNodes); };
-    return within(0, x) && within(1, y) && within(2, z);
+    return within(0, edge.x) && within(1, edge.y) && within(2, edge.z);
   };
-  const int start = node_index(x, y, z), stride = node_stride(mask);
+  const int start = node_index(edge.x, edge.y, edge.z), stride = node_stride(edge.mask);
   const double f0 = value(start), f1 = value(start + stride);
   const double before = inside(-1) ? value(start - stride) : kMissing;
   const double after = inside(2) ? value(start + 2 * stride) : kMissing;

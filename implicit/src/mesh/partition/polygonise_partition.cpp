@@ -356,10 +356,17 @@ std::vector<Mesh> write_meshes(std::size_t bodies, const AllVertices& all, std::
   return meshes;
 }
 
+/// Fields, and for each a number that changes with it.
+struct VersionedFields {
+  std::span<const FieldView> fields;
+  std::span<const std::uint64_t> version;
+};
+
 /// Divides space anew where `partition`, of the last call, does not hold; it becomes that of this one, or empty where that would take more.
 /// @param most_kept  [byte]
-std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std::uint64_t> version, const Lattice& lattice,
-                         const Executor& executor, std::uint64_t most_kept, KeptPartition& partition, PolygoniseCounts& count) {
+std::vector<Mesh> divide(const VersionedFields& of, const Lattice& lattice, std::uint64_t most_kept, KeptPartition& partition,
+                         const Executor& executor, PolygoniseCounts& count) {
+  const std::span<const FieldView> fields = of.fields;
   count = {};
   std::vector<Box> surface;
   std::vector<std::uint8_t> has_mesh;
@@ -374,7 +381,7 @@ std::vector<Mesh> divide(std::span<const FieldView> fields, std::span<const std:
   count.cell = lattice.cell;
   count.blocks = list.block.size();
 
-  const std::vector<ChangedBlock> changed = take_blocks(partition, list, lattice, version);
+  const std::vector<ChangedBlock> changed = take_blocks(partition, list, lattice, of.version);
   std::vector<std::uint32_t> to_make;
   for (std::uint32_t i = 0; i < partition.block.size(); ++i) {
     if (partition.block[i].made) to_make.push_back(i);
@@ -424,7 +431,7 @@ std::vector<Mesh> PartitionMesher::make(std::span<const FieldView> fields, std::
   PolygoniseCounts local;
   PolygoniseCounts& count = counts != nullptr ? *counts : local;
   KeptPartition partition = std::exchange(impl_->kept, {});  // no data are kept of a call that throws
-  std::vector<Mesh> meshes = divide(fields, version, lattice, executor, kMostKeptBytes, partition, count);
+  std::vector<Mesh> meshes = divide({fields, version}, lattice, kMostKeptBytes, partition, executor, count);
   impl_->kept = std::move(partition);
   return meshes;
 }
@@ -437,7 +444,7 @@ std::vector<Mesh> polygonise_partition(std::span<const FieldView> fields, const 
   std::vector<std::uint64_t> version(fields.size());
   std::iota(version.begin(), version.end(), std::uint64_t{0});
   KeptPartition none;
-  return divide(fields, version, lattice, executor, 0, none, counts != nullptr ? *counts : local);
+  return divide({fields, version}, lattice, 0, none, executor, counts != nullptr ? *counts : local);
 }
 
 }  // namespace supple::implicit

@@ -65,7 +65,7 @@ void Labeller::solve_edges(const LabelledBlock& block, Label low, Label high, Pa
       const auto node = static_cast<std::size_t>(at);
       return low == 0 ? value(plus, node) : value(plus, node) - value(minus, node);
     };
-    add_edge(x, y, z, mask, nodes_, f, roots_);
+    add_edge({x, y, z, mask}, nodes_, f, roots_);
   });
   if (low == 0) {
     roots_.solve(fields_[candidates_[plus]], {}, scale_[plus]);

@@ -152,7 +152,7 @@ class Simulation {
   [[nodiscard]] const core::Loads& contact_loads();
   /// Fields of the bodies at the current state; valid until the next step.
   [[nodiscard]] const std::vector<implicit::Field>& fields();
-  /// Division of space between bodies that touch, the basis of `meshes`: claims of deformed fields, bulges included. Kept until the next step.
+  /// Division of space between bodies that touch, the basis of `meshes`: deformed pressures, bulges included. Kept until the next step.
   [[nodiscard]] const Division& division();
   /// Everything that the field of one of `contact_bodies` depends on in the current state, to the bit.
   void add_field_content(std::uint32_t body, ContentWords& words);

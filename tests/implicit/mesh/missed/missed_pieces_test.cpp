@@ -278,7 +278,7 @@ TEST(MissedPieces, AreDecidedWhereTwoSidesOfABendAreAsNear) {
   }
 }
 
-/// Bodies that divide space, as a scene's do: claims are weight * F.
+/// Bodies that divide space, as a scene's do: weighted fields are weight * F.
 struct Divided {
   std::vector<Mesh> coarse, mesh;
   MissedPieces found;
@@ -311,9 +311,9 @@ class Weighted {
 
 Divided search_divided(std::span<const SearchedBody> bodies, const Lattice& lattice, int threads = 2) {
   const Executor executor(threads);
-  std::vector<Weighted> claims;
-  for (const SearchedBody& body : bodies) claims.emplace_back(body);
-  const std::vector<FieldView> views(claims.begin(), claims.end());
+  std::vector<Weighted> weighted;
+  for (const SearchedBody& body : bodies) weighted.emplace_back(body);
+  const std::vector<FieldView> views(weighted.begin(), weighted.end());
   Divided d;
   d.mesh = d.coarse = polygonise_partition(views, lattice, executor);
   d.found = add_missed_pieces(bodies, lattice, executor, d.mesh);
@@ -480,8 +480,8 @@ void expect_touch_decided(const Body& a, const Body& b) {
   for (std::size_t m = 0; m < 2; ++m) {
     expect_closed(d.mesh[m]);
     for (std::size_t v = d.coarse[m].vertex_count(); v < d.mesh[m].vertex_count(); ++v) {
-      const auto claim = [&](std::size_t k) { return bodies[k].weight * FieldView(*bodies[k].field).value(d.mesh[m].position[v]); };
-      EXPECT_NEAR(claim(m), std::max(claim(1 - m), 0.0), 1e-4);
+      const auto weighted_field = [&](std::size_t k) { return bodies[k].weight * FieldView(*bodies[k].field).value(d.mesh[m].position[v]); };
+      EXPECT_NEAR(weighted_field(m), std::max(weighted_field(1 - m), 0.0), 1e-4);
     }
     EXPECT_EQ(hash_of(alone.mesh[m]), hash_of(d.mesh[m]));
   }

@@ -1,4 +1,4 @@
-#include "bounds/claim_bounds.h"
+#include "bounds/weighted_bounds.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,34 +13,34 @@ namespace {
 
 Interval scaled(const Interval& value, double weight) { return {weight * value.lower, weight * value.upper}; }
 
-/// rho of a lead of a claim in [a] over one in [b], 0 <= a, where b <= a.
+/// rho of a lead of a weighted field in [a] over one in [b], 0 <= a, where b <= a.
 Interval rho_of(const Interval& a, const Interval& b, double depth) {
   const double least = b.upper > 0.0 ? std::max(1.0 - b.upper / a.lower, 0.0) : 1.0 - b.upper / a.upper;  // of 1 - b / a
   const double most = b.lower > 0.0 ? 1.0 - b.lower / a.upper : 1.0 - b.lower / a.lower;
   const double low = 1.0 / (1.0 + depth * most / (a.lower + depth)), high = 1.0 / (1.0 + depth * least / (a.upper + depth));
-  // Not a number where claims are 0.
+  // Not a number where weighted fields are 0.
   return {low >= 0.0 ? std::min(low, 1.0) * (1.0 - 1e-12) : 0.0, high <= 1.0 ? high * (1.0 + 1e-12) : 1.0};
 }
 
 }  // namespace
 
-Claim::Claim(const SearchedBody& body) : field_(body.field), weight_(body.weight), depth_(-bound(Box{}).lower) {}
+WeightedField::WeightedField(const SearchedBody& body) : field_(body.field), weight_(body.weight), depth_(-bound(Box{}).lower) {}
 
-Box Claim::support_box() const {
+Box WeightedField::support_box() const {
   Box all;
   for (const Box& support : field_->packed().support) all = all.united(support);
   return all;
 }
 
-void find_candidates(std::span<const Claim> claims, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found) {
+void find_candidates(std::span<const WeightedField> weighted, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found) {
   found.body.clear();
   found.offset.assign(1, 0);
   found.primitive.clear();
   for (const std::uint32_t body : bodies) {
     const std::size_t first = found.primitive.size();
-    find_primitives(claims[body].field(), box, found.primitive);
+    find_primitives(weighted[body].field(), box, found.primitive);
     if (found.primitive.size() == first) continue;
-    if (!is_sum(claims[body].field())) found.primitive.resize(first);
+    if (!is_sum(weighted[body].field())) found.primitive.resize(first);
     found.body.push_back(body);
     found.offset.push_back(static_cast<std::uint32_t>(found.primitive.size()));
   }
@@ -61,19 +61,19 @@ void CubeBounds::start(const Box& box, const Candidates& candidates) {
   count_ = 1 + candidates.body.size();
   if (entry_.size() < count_) entry_.resize(count_);
   for (std::size_t k = 0; k + 1 < count_; ++k) {
-    const Claim& claim = claims_[candidates.body[k]];
+    const WeightedField& weighted_field = weighted_[candidates.body[k]];
     Entry& entry = entry_[k + 1];
     entry.label = candidates.body[k] + 1;
-    entry.weight = claim.weight();
-    entry.depth = claim.depth();
-    start_bounds(claim.field(), box, candidates.primitives_of(k), entry.bounds);
+    entry.weight = weighted_field.weight();
+    entry.depth = weighted_field.depth();
+    start_bounds(weighted_field.field(), box, candidates.primitives_of(k), entry.bounds);
     entry.value = scaled(entry.bounds.value, entry.weight);
   }
 }
 
 void CubeBounds::add(Step step, const Box& box) {
   for (Entry& entry : entries().subspan(1)) {
-    step(claims_[entry.label - 1].field(), box, entry.bounds);
+    step(weighted_[entry.label - 1].field(), box, entry.bounds);
     entry.value = scaled(entry.bounds.value, entry.weight);
   }
 }
@@ -120,7 +120,7 @@ std::array<Verdict, 8> CubeBounds::eighths(const Box& box) {
   value_.resize(count_);
   slope_.resize(count_);
   for (std::size_t i = 1; i < count_; ++i) {
-    if (entry_[i].bounds.curved.known) claims_[entry_[i].label - 1].field().evaluate(middle, value_[i], slope_[i]);
+    if (entry_[i].bounds.curved.known) weighted_[entry_[i].label - 1].field().evaluate(middle, value_[i], slope_[i]);
   }
   for (unsigned c = 0; c < 8; ++c) {
     for (std::size_t i = 1; i < count_; ++i) {
@@ -168,7 +168,7 @@ bool CubeBounds::passes_convex_primitives() const {
 }
 
 void CubeBounds::find_leads(const Entry& own) {
-  // Where `own` is the owner, its claim is the largest.
+  // Where `own` is the owner, its weighted field is the largest.
   const Interval a{std::max(own.value.lower, most_), std::max(own.value.upper, most_)};
   const auto above_least = [&](const Entry& e) { return Interval{e.value.lower + e.depth, std::min(e.value.upper, a.upper) + e.depth}; };
   lead_.clear();
@@ -188,7 +188,7 @@ void CubeBounds::find_leads(const Entry& own) {
     if (e.label == own.label) continue;
     // Shares are p / (c_a + phi).
     const double upper = above_least(e).upper;
-    const auto is_less = [&](double claim) { return upper * (claim + nearest->depth) < near * (claim + e.depth); };
+    const auto is_less = [&](double weighted_field) { return upper * (weighted_field + nearest->depth) < near * (weighted_field + e.depth); };
     if (&e != nearest && is_less(a.lower) && is_less(a.upper)) continue;
     lead_.push_back({&e, own.label == 0 || e.label == 0 ? Interval{1.0, 1.0} : rho_of(a, e.value, e.depth)});
   }

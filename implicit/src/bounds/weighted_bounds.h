@@ -1,7 +1,7 @@
-/// @file claim_bounds.h
+/// @file weighted_bounds.h
 /// Bodies that divide space, and bounds of the owner of a cube. Label 0 is outside, m + 1 is body m.
 ///
-/// With claims c_m = weight F_m, p_m = c_m + phi_m >= 0 is the claim above its least value, which it has beyond the supports of m. Label a owns the points where
+/// With weighted fields c_m = weight F_m, p_m = c_m + phi_m >= 0 is the weighted field above its least value, which it has beyond the supports of m. Label a owns the points where
 ///   M_a = c_a (1 - max over m != a of p_m / (c_a + phi_m)),  M_0 = 1 - max over m of p_m / phi_m
 /// are above 0: where c_a > 0 and c_a > c_m, and where all c_m < 0. These do not depend on a cube, so each M_a is one continuous function over space
 /// and has a maximum in every closed piece of a; a body has no effect out of its reach, as p_m is 0 there. So a cube needs only the bodies that
@@ -21,9 +21,9 @@ namespace supple::implicit {
 using lattice::Label;
 
 /// weight * F.
-class Claim {
+class WeightedField {
  public:
-  explicit Claim(const SearchedBody& body);
+  explicit WeightedField(const SearchedBody& body);
   /// phi: beyond all supports it is -phi.
   [[nodiscard]] double depth() const { return depth_; }
   void evaluate(std::span<const Vec3> points, std::span<double> values) const {
@@ -40,7 +40,7 @@ class Claim {
   [[nodiscard]] double gradient_bound(const Box& box) const { return weight_ * field_->gradient_bound(box); }
   [[nodiscard]] Box surface_box() const { return field_->surface_box(); }
   [[nodiscard]] double feature_size() const { return field_->feature_size(); }
-  /// Beyond it the claim has its least value.
+  /// Beyond it the weighted field has its least value.
   [[nodiscard]] Box support_box() const;
   [[nodiscard]] const Field& field() const { return *field_; }
   [[nodiscard]] double weight() const { return weight_; }
@@ -55,7 +55,7 @@ class Claim {
 struct Verdict {
   bool certain = false;  ///< all of it is `label`'s
   Label label = 0;
-  bool flat = false;     ///< no difference of two claims has an extremum there
+  bool flat = false;     ///< no difference of two weighted fields has an extremum there
   bool second_order = true;
   [[nodiscard]] bool settled() const { return certain || flat; }
 };
@@ -71,12 +71,12 @@ struct Candidates {
   }
 };
 /// Those of some bodies whose supports reach a box.
-void find_candidates(std::span<const Claim> claims, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found);
+void find_candidates(std::span<const WeightedField> weighted, const Box& box, std::span<const std::uint32_t> bodies, Candidates& found);
 
-/// Computes bounds of the claims on cubes; the claim of outside is 0.
+/// Computes bounds of the weighted fields on cubes; the weighted field of outside is 0.
 class CubeBounds {
  public:
-  explicit CubeBounds(std::span<const Claim> claims) : claims_(claims), entry_(1) {
+  explicit CubeBounds(std::span<const WeightedField> weighted) : weighted_(weighted), entry_(1) {
     entry_[0].bounds.second_order = true;
     entry_[0].bounds.hull.assign(1, {});
   }
@@ -87,7 +87,7 @@ class CubeBounds {
   /// Bodies that matter on parts of the last box, with their primitives in reach.
   void narrow(Candidates& narrowed) const;
   /// The same for the eighths of the last box if that was undecided, x + 2 y + 4 z: by its bounds of second derivatives and
-  /// by values and gradients at their centres. Undecided where some claim has no bounds of second derivatives, and between single primitives, where steps cost no more.
+  /// by values and gradients at their centres. Undecided where some weighted field has no bounds of second derivatives, and between single primitives, where steps cost no more.
   [[nodiscard]] std::array<Verdict, 8> eighths(const Box& box);
 
  private:
@@ -95,10 +95,10 @@ class CubeBounds {
     Label label = 0;
     double weight = 1.0, depth = 0.0;
     GradientBounds bounds;              ///< of the field
-    Interval value{};                   ///< of the claim
+    Interval value{};                   ///< of the weighted field
     bool matters = false;
   };
-  /// Lead of a claim over another one.
+  /// Lead of a weighted field over another one.
   struct Lead {
     Entry* other;
     Interval rho;
@@ -109,7 +109,7 @@ class CubeBounds {
   [[nodiscard]] bool may_have_part(const Entry& e) const { return !(e.value.upper < most_) && (e.label == 0 || e.value.upper > 0.0); }
   /// Leaves out bodies that neither own a part of the cube nor are next to an owner. @pre judge() was called
   void drop_others();
-  /// The leads of a claim that may be the least one where it owns a part of the cube.
+  /// The leads of a weighted field that may be the least one where it owns a part of the cube.
   void find_leads(const Entry& own);
   [[nodiscard]] std::span<Entry> entries() { return std::span(entry_).first(count_); }
 
@@ -118,7 +118,7 @@ class CubeBounds {
   [[nodiscard]] bool knows_eighths() const;
   [[nodiscard]] Verdict judge();
   [[nodiscard]] bool is_flat();
-  /// Whether there is a direction along which all leads rise that may be the least of a claim.
+  /// Whether there is a direction along which all leads rise that may be the least of a weighted field.
   [[nodiscard]] bool rises(const Entry& own);
   /// Whether the least lead of outside has no maximum there because at most three convex primitives are near. Where no direction leads
   /// away from all bodies, some multiples of the slopes of squared distances cancel, so that those of three lie in a plane. By convexity no distance
@@ -126,7 +126,7 @@ class CubeBounds {
   /// @pre rises(outside) was called last
   [[nodiscard]] bool passes_convex_primitives() const;
 
-  std::span<const Claim> claims_;
+  std::span<const WeightedField> weighted_;
   std::vector<Entry> entry_;  ///< the first is outside; they keep their memory
   std::size_t count_ = 1;     ///< of those in use
   std::vector<std::array<double, 8>> value_;  ///< by entry, at the middles of eighths,
@@ -134,7 +134,7 @@ class CubeBounds {
   std::vector<Lead> lead_;
   std::vector<Vec3> over_;      ///< gradients of the leads,
   std::vector<double> turn_;    ///< and how far they turn
-  double most_ = 0.0;  ///< that the largest claim is everywhere
+  double most_ = 0.0;  ///< that the largest weighted field is everywhere
 };
 
 }  // namespace supple::implicit
