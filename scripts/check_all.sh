@@ -73,13 +73,15 @@ else
 fi
 if ! chose install; then
   :
-elif part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON; then
+elif part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3; then
   part "headers stand alone" "$logs/headers.log" \
     configure_and_build release all_verify_interface_header_sets || true
   part "installed package" "$logs/package.log" check_package "$supple_root/build/release" || true
+  part "Python wheel" "$logs/wheel.log" check_wheel "$supple_root/build/release" || true
+  part "Debian package" "$logs/deb.log" check_deb "$supple_root/build/release" || true
+  part "documentation site" "$logs/docs.log" "$here/docs.sh" "$supple_root/build/release" || true
 else
-  skip_part "headers stand alone" "no build"
-  skip_part "installed package" "no build"
+  for name in "headers stand alone" "installed package" "Python wheel" "Debian package" "documentation site"; do skip_part "$name" "no build"; done
 fi
 
 failed=0

@@ -10,11 +10,13 @@ declare -A supple_packages=(
            libyaml-cpp-dev nlohmann-json3-dev libcli11-dev"
   [run]="libosmesa6 libegl1 libgl1-mesa-dri ffmpeg"
   [test]="libgtest-dev libcgal-dev libopenvdb-tools"
-  [python]="pybind11-dev python3-dev python3-numpy"
+  [python]="pybind11-dev python3-dev python3-numpy python3-venv"
   [check]="clang clang-tidy"
+  [docs]="doxygen python3-venv"
+  [deb]="dpkg-dev mmdebstrap"
 )
 declare -A supple_purpose=(
-  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, and Delaunay meshes" [python]="for the Python package" [check]="for the second compiler and static analysis"
+  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, and Delaunay meshes" [python]="for the Python package" [check]="for the second compiler and static analysis" [docs]="for the documentation site" [deb]="to try the Debian package"
 )
 
 # missing_packages NAME...: prints those that dpkg does not list as installed.

@@ -50,3 +50,46 @@ check_package() {
   (cd / && PYTHONPATH=$(dirname "$(dirname "$package")") /usr/bin/python3 -B "$supple_root/tests/package/minimal_script.py" \
     "$supple_root/tests/package/two_balls.yaml")
 }
+
+# check_deb BUILD_FOLDER: makes the Debian package and installs it in a new root with nothing but Debian's base, where the tool runs a
+# library scene by name and Python imports the package. As root; needs Debian's archive.
+check_deb() {
+  local build=$1 scratch=$supple_root/build/deb package sources=/etc/apt/sources.list.d/debian.sources
+  install_packages deb
+  rm -rf "$scratch" && mkdir -p "$scratch"
+  (cd "$scratch" && cpack --config "$build/CPackConfig.cmake" -G DEB -B "$scratch/made") || return 1
+  package=$(find "$scratch/made" -maxdepth 1 -name 'supple_*.deb')
+  dpkg-deb --info "$package"
+  [[ -f $sources ]] || sources=/etc/apt/sources.list
+  mmdebstrap --quiet --variant=minbase --include=ca-certificates "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$scratch/root" "$sources" || return 1
+  cp "$package" "$scratch/root/supple.deb"
+  chroot "$scratch/root" sh -eu -c '
+    apt-get -q update && DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends /supple.deb
+    cd /root
+    supple run two_balls --simulate-only --frames 1-4 --progress none
+    supple view out/two_balls --progress none && test -s out/two_balls/two_balls_view.html
+    supple check ball_hits_spiral
+    python3 -c "import supple; print(supple.library(\"two_balls\"))"
+    test -s /usr/share/supple/blender/supple_import.py && test -s /usr/share/man/man1/supple.1' || return 1
+  rm -rf "$scratch/root"
+}
+
+# check_wheel BUILD_FOLDER: makes the wheel of a build and uses it in a new virtual environment; importing takes less than 0.3 s.
+check_wheel() {
+  local build=$1 scratch=$supple_root/build/wheel_check python
+  python=$(sed -n 's/^_\?Python_EXECUTABLE:[A-Z]*=//p' "$build/CMakeCache.txt" | head -n 1)
+  rm -rf "$scratch"
+  PYTHON=$python "$supple_root/scripts/wheel.sh" --build "$build" --out "$scratch" || return 1
+  "$python" -m venv "$scratch/new" && "$scratch/new/bin/pip" install --quiet --disable-pip-version-check "$scratch"/supple-*.whl || return 1
+  (cd "$scratch" && env -i PATH="$scratch/new/bin:/usr/bin:/bin" sh -eu -c '
+    supple run two_balls --simulate-only --frames 1-4 --progress none
+    supple view out/two_balls --progress none && test -s out/two_balls/two_balls_view.html
+    python -c "
+import time
+begin = time.process_time()
+import supple
+took = time.process_time() - begin
+print(f\"import takes {took:.2f} s\")
+assert took < 0.3
+assert supple.Simulation(supple.library(\"two_balls\")).state_hash"')
+}

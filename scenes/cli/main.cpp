@@ -21,15 +21,19 @@
 #include "benchmarks.h"
 #include "describe.h"
 #include "last_resort.h"
+#include "library.h"
 #include "print.h"
 #include "progress_bar.h"
 #include "templates.h"
 #include "usage.h"
+#include "view.h"
+#include "view_server.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/descriptor.h"
 #include "supple/scenes/check.h"
+#include "supple/scenes/gltf.h"
 #include "supple/scenes/inspect.h"
 #include "supple/scenes/limits.h"
 #include "supple/scenes/query.h"
@@ -89,6 +93,7 @@ struct Arguments {
   std::vector<std::string> words;
   int threads = 0;
   int at_once = 0;
+  int port = 0;
   double memory = 0.0;      // [byte]; 0: not given
   double time_limit = 0.0;  // [s]; 0: none
   int cells = 0;
@@ -105,6 +110,8 @@ struct Arguments {
   bool list = false;
   bool sheet = false;
   bool no_film = false;
+  bool view = false;
+  bool gltf = false;
 };
 
 void print_profile(const scenes::RunResult& result) {
@@ -194,9 +201,27 @@ scenes::Scene read_for_run(const Arguments& arguments) {
 int run(const Arguments& arguments) {
   const scenes::Scene scene = read_for_run(arguments);
   tool::ProgressBar bar = make_bar(arguments);
-  const scenes::RunResult result = scenes::run_scene(scene, run_options(arguments, folder_of(scene, arguments), bar));
+  scenes::RunOptions options = run_options(arguments, folder_of(scene, arguments), bar);
+  std::optional<tool::ViewServer> server;
+  if (arguments.view) {
+    server.emplace(scene, tool::ViewServer::Settings{.folder = options.folder, .port = arguments.port, .memory = options.scene_memory, .interrupt = &interrupted});
+    options.progress = [&bar, &server](const scenes::Progress& progress) {
+      server->begin();  // states of an earlier run are removed before the first report
+      bar.show(progress);
+    };
+    print(std::cout, "view:   %s\n", server->address().c_str());
+    std::cout.flush();
+  }
+  const scenes::RunResult result = scenes::run_scene(scene, options);
   bar.finish();
-  return report(result, arguments);
+  const int code = report(result, arguments);
+  if (server && interrupted == 0) {
+    server->end();
+    if (!arguments.quiet) print(std::cout, "view:   served until Control-C\n");
+    std::cout.flush();
+    server->wait();
+  }
+  return code;
 }
 
 int render(const Arguments& arguments) {
@@ -212,13 +237,21 @@ int render(const Arguments& arguments) {
 }
 
 int export_files(Arguments arguments) {
+  bool frames_too = !arguments.gltf;  // files of single frames
   for (const auto& [key, formats] : {std::pair{"mesh", &arguments.meshes}, {"grid", &arguments.grids},
                                      {"particles", &arguments.particles}, {"contacts", &arguments.contacts},
                                      {"samples", &arguments.sample_tables}}) {
+    frames_too = frames_too || !formats->empty();
     if (!formats->empty()) arguments.set.push_back("output." + std::string(key) + "=[" + *formats + ']');
   }
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
   tool::ProgressBar bar = make_bar(arguments);
+  if (arguments.gltf) {
+    const fs::path file = scenes::write_gltf(scene, run_options(arguments, folder_of(scene, arguments), bar));
+    bar.finish();
+    if (!arguments.quiet) print(std::cout, "gltf:   %s\n", file.c_str());
+    if (!frames_too) return 0;
+  }
   const scenes::RunResult result = scenes::export_run(scene, run_options(arguments, folder_of(scene, arguments), bar));
   bar.finish();
   return report(result, arguments);
@@ -358,6 +391,8 @@ int parse_and_call(int argc, char** argv, bool silent) {
   drawing_flags(run_verb, a);
   run_verb->add_option("--time-limit", a.time_limit, "stop after this many seconds, between two steps; --resume continues from the last saved state")
       ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
+  run_verb->add_flag("--view", a.view, "serve a page to this machine that follows the run (`supple view`)");
+  run_verb->add_option("--port", a.port, "with --view: port of the page (default: any that is free)")->check(CLI::Range(0, 65535));
   run_verb->add_flag("--render-only", a.render_only, "draw pictures and film from the saved states of an earlier run, as `supple render` does");
   run_verb->footer(std::string(kFilmRule) +
                    "With --frames a run ends after the last of them; result.json holds its last frame, and --resume continues from there.\n\n"
@@ -373,12 +408,17 @@ int parse_and_call(int argc, char** argv, bool silent) {
   CLI::App* export_verb = app.add_subcommand("export", "write files for other tools from the saved states of a run");
   run_flags(export_verb, a);
   export_verb->add_option("--mesh", a.meshes, "meshes of the surfaces: ply, obj, usd, separated by commas");
+  export_verb->add_flag("--gltf", a.gltf, "one binary glTF file with meshes, materials and cameras of all frames: NAME.glb");
   export_verb->add_option("--grid", a.grids, "fields: vdb");
   export_verb->add_option("--particles", a.particles, "particles and bonds: csv, vtk");
   export_verb->add_option("--contacts", a.contacts, "points of the contact surfaces: csv, vtk");
   export_verb->add_option("--samples", a.sample_tables, "points spread evenly over the surfaces: csv, vtk");
   memory_flag(export_verb, a, "limit of memory for the scene, which is refused if it needs more (default: 8G)");
   export_verb->footer("Example: supple export scenes/library/contacts/two_balls.yaml --out out/two_balls --mesh usd --particles vtk");
+
+  tool::ViewArguments view_arguments;
+  view_arguments.quiet = silent;
+  CLI::App* view_verb = tool::add_view(app, view_arguments);
 
   CLI::App* info_verb = app.add_subcommand("info", "show what a run folder holds: outcome, audits, times, files");
   info_verb->add_option("run", a.scene, "run folder")->required();
@@ -439,6 +479,9 @@ int parse_and_call(int argc, char** argv, bool silent) {
   describe_verb->add_option("form", a.query, "bash, zsh or man")->required()->check(CLI::IsMember({"bash", "zsh", "man"}));
   describe_verb->footer("Example: source <(supple describe bash)");
 
+  CLI::App* scenes_verb = app.add_subcommand("scenes", "list the scenes of the library, which every command takes by name");
+  scenes_verb->footer("Example: supple run two_balls");
+
   CLI::App* new_verb = app.add_subcommand("new", "write a small scene from a template");
   new_verb->add_option("name", a.scene, "name of the scene; the file is NAME.yaml")->required();
   new_verb->add_option("--template", a.from, "template of the scene")->default_val("ball");
@@ -456,6 +499,17 @@ int parse_and_call(int argc, char** argv, bool silent) {
     return kUsage;
   }
   a.words = bench_verb->remaining();
+  if (view_verb->parsed()) {
+    heed_signals();
+    return tool::view(view_arguments, interrupted);
+  }
+  if (scenes_verb->parsed()) {
+    std::cout << tool::list_library();
+    return 0;
+  }
+  for (const CLI::App* verb : {run_verb, render_verb, export_verb, check_verb, explain_verb, query_verb}) {
+    if (verb->parsed()) a.scene = tool::find_scene(a.scene);
+  }
   if (run_verb->parsed()) return a.render_only ? render(a) : run(a);
   if (render_verb->parsed()) return render(a);
   if (export_verb->parsed()) return export_files(a);

@@ -43,7 +43,8 @@ class Queue {
 /// A simulation that several Python threads may use: calls wait for each other without holding the interpreter.
 class Handle {
  public:
-  Handle(scenes::Scene scene, scenes::SimulationOptions options) : simulation_(std::move(scene), std::move(options)) {}
+  Handle(scenes::Scene scene, scenes::SimulationOptions options)
+      : simulation_(std::move(scene), options), threads_(options.threads), profile_(options.profile) {}
 
   /// f(simulation), without the interpreter: f may not touch Python objects.
   template <class F>
@@ -54,11 +55,17 @@ class Handle {
   }
   /// For what never changes: the scene, and the addresses of arrays.
   [[nodiscard]] const scenes::Simulation& fixed() const { return simulation_; }
+  /// Before Python has the object. @pre the state belongs to the scene
+  void restore(scenes::State state) { simulation_.restore(std::move(state)); }
+  [[nodiscard]] int threads() const { return threads_; }
+  [[nodiscard]] bool profile() const { return profile_; }
 
   std::atomic<bool> cancelled{false};
 
  private:
   scenes::Simulation simulation_;
+  int threads_;
+  bool profile_;
   Queue queue_;
 };
 

@@ -1,6 +1,7 @@
 #include <pybind11/stl.h>
 
 #include "arrays.h"
+#include "fields.h"
 #include "supple/scenes/contact_report.h"
 #include "supple/scenes/probe.h"
 
@@ -146,6 +147,13 @@ PairContact contact(Handle& handle, const std::string& a, const std::string& b, 
   });
 }
 
+PairContact touch(const Field& a, const Field& b, double error) {
+  if (!(error >= 1e-10 && error <= 0.1)) throw py::value_error("error: expected a relative error from 1e-10 to 0.1");
+  if (a.body == b.body) throw py::value_error("b: expected another body than a");
+  const py::gil_scoped_release others_run;
+  return {"a", "b", std::make_shared<const ContactSurface>(collision::touch(*a.body, *b.body, error).surface)};
+}
+
 }  // namespace
 
 void bind_contacts(py::module_& module, Simulation& simulation) {
@@ -213,6 +221,11 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
       .def("__repr__", [](const LawReport& l) {
         return py::str("<supple.LawLoads {}, energy = {:.6g} J>").format(l.name, l.energy);
       });
+
+  module.def("contact", &touch, py::arg("a"), py::arg("b"), py::arg("error") = 1e-4,
+             "The contact of two bodies that need no scene, each a Field, without damping and friction.\n\n"
+             "error  required relative error of force, area and centre of pressure, from 1e-10 to 0.1; error_estimate of the answer is the estimate of the\n"
+             "       error that was reached.");
 
   simulation.def("contacts", &report, "All contacts of the current state.")
       .def("contact", &contact, py::arg("a"), py::arg("b"), py::arg("error") = 1e-4,

@@ -2,6 +2,7 @@
 #include <string>
 
 #include "bindings.h"
+#include "fields.h"
 
 namespace {
 
@@ -34,7 +35,8 @@ PYBIND11_MODULE(_supple, module) {
   python::bind_runs(module);
   python::Simulation simulation = python::bind_simulation(module);
   python::bind_particles(module, simulation);
-  python::bind_contacts(module, simulation);
   python::bind_surfaces(module, simulation);
+  python::bind_fields(module);
+  python::bind_contacts(module, simulation);
   module.attr("__name__") = own_name;
 }

@@ -11,7 +11,9 @@
 #include "bindings.h"
 #include "supple/core/hash.h"
 #include "supple/scenes/inspect.h"
+#include "supple/scenes/gltf.h"
 #include "supple/scenes/run.h"
+#include "supple/scenes/view.h"
 
 namespace supple::python {
 namespace {
@@ -67,17 +69,23 @@ class Watched {
   std::exception_ptr raised_;
 };
 
-RunResult call(RunResult (*verb)(const Scene&, const RunOptions&), const Scene& scene, RunOptions options,
-               const py::object& progress) {
-  Watched watched;
-  options.interrupt = &watched.interrupt;
+/// @param use  called with options whose interrupt and progress are those of the call
+template <class Options, class Use>
+auto watched(Options options, const py::object& progress, const Use& use) {
+  Watched call;
+  options.interrupt = &call.interrupt;
   if (!progress.is_none()) {
     options.progress = [&](const Progress& now) {
       const py::gil_scoped_acquire hold;
-      watched.guarded([&] { progress(now); });
+      call.guarded([&] { progress(now); });
     };
   }
-  return watched.call([&] { return verb(scene, options); });
+  return call.call([&] { return use(options); });
+}
+
+RunResult call(RunResult (*verb)(const Scene&, const RunOptions&), const Scene& scene, RunOptions options,
+               const py::object& progress) {
+  return watched(std::move(options), progress, [&](const RunOptions& o) { return verb(scene, o); });
 }
 
 RunResult run(const Scene& scene, const Path& folder, const Frames& frames, int threads, bool overwrite, bool resume,
@@ -102,6 +110,19 @@ RunResult export_files(const Scene& scene, const Path& folder, const Frames& fra
                        const py::object& progress) {
   return call(&scenes::export_run, scene, {.folder = folder, .frames = frames_of(frames), .threads = threads},
               progress);
+}
+
+Path view(const Scene& scene, const Path& folder, const std::optional<Path>& page, const Frames& frames, int cells, double size, int threads,
+          const py::object& progress) {
+  if (cells < 0) throw py::value_error("cells: expected a number >= 0");
+  const scenes::ViewOptions options{
+      .folder = folder, .page = page.value_or(Path()), .frames = frames_of(frames), .threads = threads, .cells = cells, .size = size};
+  return watched(options, progress, [&](const scenes::ViewOptions& o) { return scenes::write_view(scene, o).page; });
+}
+
+Path write_gltf(const Scene& scene, const Path& folder, const Frames& frames, int threads, const py::object& progress) {
+  const RunOptions options{.folder = folder, .frames = frames_of(frames), .threads = threads};
+  return watched(options, progress, [&](const RunOptions& o) { return scenes::write_gltf(scene, o); });
 }
 
 }  // namespace
@@ -163,6 +184,19 @@ void bind_runs(py::module_& module) {
   module.def("export", &export_files, py::arg("scene"), py::arg("folder"), py::kw_only(),
              py::arg("frames") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
              export_doc.c_str());
+  module.def("view", &view, py::arg("scene"), py::arg("folder"), py::arg("page") = py::none(), py::kw_only(), py::arg("frames") = py::none(),
+             py::arg("cells") = 0, py::arg("size") = 9.5e6, py::arg("threads") = 0, py::arg("progress") = py::none(),
+             "Writes a page that plays a run in a browser, from its saved states, as `supple view` does. Returns its path.\n\n"
+             "page      file to write; default: NAME_view.html in the folder\n"
+             "frames    frames to show; default: all\n"
+             "cells     of the meshes, along the longest side of all surfaces; 0: as many as `size` admits\n"
+             "size      largest page [byte]\n"
+             "threads   number of threads, 0: all of the machine\n"
+             "progress  called with a Progress from time to time");
+  module.def("write_gltf", &write_gltf, py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("frames") = py::none(), py::arg("threads") = 0,
+             py::arg("progress") = py::none(),
+             "Writes meshes, materials and cameras of a run to one binary glTF file, NAME.glb in its folder, as `supple export --gltf` does. Returns its\n"
+             "path.");
   module.def("info", &scenes::describe_run, py::arg("folder"),
              "Describes a run folder in text: outcome, audits, times, files.");
 

@@ -29,6 +29,22 @@ Scene parse(const std::string& text, const py::object& overrides, const std::fil
   return scenes::parse_scene(text, name, folder, texts);
 }
 
+/// From a mapping with the keys of a scene file.
+Scene make(const py::object& description, const py::object& overrides, const std::filesystem::path& folder, const std::string& name) {
+  return parse(py::module_::import("supple._scenes").attr("scene_text")(description).cast<std::string>(), overrides, folder, name);
+}
+
+py::tuple recipe_of(const Scene& scene) {
+  const scenes::SceneSource* const source = scenes::source_of(scene);
+  if (source == nullptr) throw py::type_error("this scene was not read, so it cannot be pickled");
+  return py::make_tuple(source->text, source->name, source->folder, source->overrides);
+}
+
+Scene scene_of(const py::tuple& recipe) {
+  const auto overrides = recipe[3].cast<std::vector<std::string>>();
+  return scenes::parse_scene(recipe[0].cast<std::string>(), recipe[1].cast<std::string>(), recipe[2].cast<std::filesystem::path>(), overrides);
+}
+
 std::vector<std::string> check(const Scene& scene) {
   const py::gil_scoped_release others_run;
   scenes::check_pictures(scene);
@@ -51,7 +67,14 @@ std::vector<std::string> object_names(const Scene& scene) {
 
 void bind_scene(py::module_& module) {
   py::class_<Scene, std::shared_ptr<Scene>>(
-      module, "Scene", "The checked content of a scene file. It is immutable; to change a value, read the file again with overrides.")
+      module, "Scene", "The checked content of a scene. It is immutable; to change a value, make it again with overrides.")
+      .def(py::init(&make), py::arg("description"), py::arg("overrides") = py::none(), py::kw_only(), py::arg("folder") = ".", py::arg("name") = "scene.yaml",
+           "From a mapping with the keys of scene files, whose values are numbers, texts such as \"5 cm\", lists, arrays and mappings.\n\n"
+           "overrides  as in read_scene\nfolder     where files that the scene names are\nname       stands for a file in messages, and names outputs\n\n"
+           "Raises Error with every fault, each with key, expectation, finding and hint.")
+      .def(py::pickle(&recipe_of, &scene_of))
+      .def("__copy__", [](const py::object& self) { return self; })
+      .def("__deepcopy__", [](const py::object& self, const py::dict&) { return self; })
       .def_property_readonly("name", &scenes::scene_name, "File name without extension; output files have this name.")
       .def_property_readonly(
           "source", [](const Scene& s) { return s.source; }, "The file it was read from.")

@@ -8,6 +8,7 @@
 #include "supple/core/hash.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/run.h"
+#include "supple/scenes/state_bytes.h"
 
 namespace supple::python {
 namespace {
@@ -91,6 +92,27 @@ void restore(Handle& handle, const SavedState& saved) {
   });
 }
 
+py::tuple pickled(const SavedState& saved) {
+  const std::vector<std::byte> bytes = scenes::state_bytes(saved.state, saved.origin);
+  return py::make_tuple(saved.origin.scene, saved.origin.keys ? *saved.origin.keys : std::string(),
+                        py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+SavedState unpickled(const py::tuple& parts) {
+  const scenes::StateOrigin origin{parts[0].cast<std::uint64_t>(), std::make_shared<const std::string>(parts[1].cast<std::string>())};
+  const auto bytes = parts[2].cast<std::string>();
+  return {scenes::state_of_bytes("state", std::as_bytes(std::span(bytes)), origin), origin};
+}
+
+Shared simulation_at(const Scene& scene, int threads, bool profile, const scenes::State& state) {
+  const py::gil_scoped_release others_run;
+  auto handle = std::make_shared<Handle>(scene, scenes::SimulationOptions{.threads = threads, .profile = profile});
+  handle->restore(state);
+  return handle;
+}
+
+Shared copied(Handle& handle) { return simulation_at(handle.fixed().scene(), handle.threads(), handle.profile(), copy_state(handle).state); }
+
 void bind_results(py::module_& module) {
   py::class_<scenes::Energies>(module, "Energies", "Energies of a state [J].")
       .def_readonly("kinetic", &scenes::Energies::kinetic, "Kinetic energy of all particles [J].")
@@ -148,6 +170,9 @@ void bind_results(py::module_& module) {
 
   py::class_<SavedState>(module, "State",
                          "All that is needed to continue with the same bits. It is a copy, which later steps do not change.")
+      .def(py::pickle(&pickled, &unpickled))
+      .def("__copy__", [](const SavedState& s) { return s; })
+      .def("__deepcopy__", [](const SavedState& s, const py::dict&) { return s; })
       .def_property_readonly(
           "frame", [](const SavedState& s) { return s.state.frame; }, "The last frame reached.")
       .def_property_readonly(
@@ -189,6 +214,13 @@ Simulation bind_simulation(py::module_& module) {
            py::arg("scene"), py::kw_only(), py::arg("threads") = 1, py::arg("profile") = false,
            "threads  number of threads, 0: all of the machine\nprofile  measure the time of every call of every stage instead of a sample of the calls\n\n"
            "Raises Error where the scene cannot be simulated.")
+      .def(py::pickle(
+          [](Handle& h) { return py::make_tuple(Scene(h.fixed().scene()), h.threads(), h.profile(), copy_state(h)); },
+          [](const py::tuple& parts) {
+            return simulation_at(parts[0].cast<const Scene&>(), parts[1].cast<int>(), parts[2].cast<bool>(), parts[3].cast<const SavedState&>().state);
+          }))
+      .def("__copy__", &copied)
+      .def("__deepcopy__", [](Handle& h, const py::dict&) { return copied(h); })
       .def_property_readonly(
           "scene", [](const Handle& h) -> const Scene& { return h.fixed().scene(); }, "The scene that is simulated.")
       .def_property_readonly("frame", &frame_of, "The last frame reached; 1 at the start.")

@@ -1,7 +1,12 @@
 import contextlib
 import io
 import os
+import pathlib
 import re
+import shutil
+import subprocess
+import sys
+import tempfile
 import unittest
 
 import supple
@@ -34,9 +39,29 @@ class EmbeddingPage(unittest.TestCase):
 class PythonPage(unittest.TestCase):
     def test_has_examples_that_run(self):
         examples = re.findall(r"```python\n(.*?)```", (SOURCE / "docs/python.md").read_text(), re.DOTALL)
-        self.assertEqual(len(examples), 4)
+        self.assertEqual(len(examples), 5)
         for example in examples:
             self.assertTrue(output_of(example, "docs/python.md") or "assert" in example)
+
+
+class TutorialPage(unittest.TestCase):
+    @unittest.skipUnless(TOOL, "the command line tool is not built")
+    def test_works_as_written(self):
+        """Its commands and its program, one after the other; pictures are smaller than there."""
+        text = (SOURCE / "docs/tutorial.md").read_text()
+        self.assertIn("size: [640, 360]", text)
+        text = text.replace("size: [640, 360]", "size: [96, 54]")
+        steps = re.findall(r"```(sh|python)\n(.*?)```", text, re.DOTALL)
+        self.assertEqual([kind for kind, _ in steps], ["sh"] * 5 + ["python"])
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.pathsep.join([str(pathlib.Path(TOOL).parent), os.environ["PATH"]])
+            for kind, step in steps:
+                command = ["bash", "-euc", step] if kind == "sh" else [sys.executable, "-B", "-c", step]
+                done = subprocess.run(command, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True)
+                self.assertEqual(done.returncode, 0, f"{step}\n{done.stdout}{done.stderr}")
+            out = pathlib.Path(folder) / "out/drop"
+            for name in ("drop_view.html", "drop_sheet.png", "drop.mp4" if shutil.which("ffmpeg") else "result.json"):
+                self.assertTrue((out / name).is_file(), name)
 
 
 class Help(unittest.TestCase):

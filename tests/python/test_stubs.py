@@ -1,5 +1,6 @@
 """The stubs name what is there, and with the same arguments."""
 import ast
+import inspect
 import pathlib
 import re
 import unittest
@@ -28,7 +29,9 @@ def arguments(function):
 
 
 def documented_arguments(thing):
-    """Those in the first line of the description, which the binding writes."""
+    """Those in the first line of the description, which the binding writes; of functions in Python those that they take."""
+    if inspect.isfunction(thing):
+        return list(inspect.signature(thing).parameters)
     inside = re.match(r"\w+\((.*)\) -> ", thing.__doc__.splitlines()[0]).group(1)
     return [name for name in re.findall(r"(?:^|, )(\w+)(?=:)", re.sub(r"\[[^\[\]]*\]", "", re.sub(r"\[[^\[\]]*\]", "", inside)))]
 

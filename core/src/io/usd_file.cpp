@@ -1,71 +1,24 @@
 #include "supple/core/io/usd_file.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <map>
 #include <numbers>
 #include <optional>
 #include <set>
-#include <system_error>
 #include <vector>
 
 #include "io/number_text.h"
+#include "io/scratch.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
-#include "supple/core/io/descriptor.h"
 
 namespace supple::io {
 namespace {
 
 constexpr std::string_view kIndent = "            ";
-
-[[noreturn]] void fail(const std::filesystem::path& path, int code) {
-  throw Error(ErrorKind::Io, Fault{.place = path.string(),
-                                   .key = {},
-                                   .expected = "cannot be written: " + std::system_category().message(code),
-                                   .found = {},
-                                   .hint = {}});
-}
-
-/// A stretch of text in a Scratch.
-struct Piece {
-  off_t at = 0;
-  std::size_t size = 0;
-};
-
-/// Text without a name in the file system, that of all attributes in the order in which it came.
-class Scratch {
- public:
-  explicit Scratch(const std::filesystem::path& beside) : path_(beside) {
-    const std::filesystem::path name = temporary_name(beside);
-    file_ = open_file(name, O_RDWR | O_CREAT | O_EXCL, 0600);
-    if (!file_.is_open()) fail(path_, errno);
-    ::unlink(name.c_str());
-  }
-
-  [[nodiscard]] Piece append(std::string_view text) {
-    if (const int code = write_all_at(file_.get(), std::as_bytes(std::span(text)), size_)) fail(path_, code);
-    const Piece piece{size_, text.size()};
-    size_ += static_cast<off_t>(text.size());
-    return piece;
-  }
-  void copy_to(AtomicFile& out, const Piece& piece) {
-    std::string text(piece.size, '\0');
-    if (const int code = read_all_at(file_.get(), std::as_writable_bytes(std::span(text)), piece.at)) fail(path_, code);
-    out.append(text);
-  }
-
- private:
-  std::filesystem::path path_;
-  Descriptor file_;
-  off_t size_ = 0;
-};
 
 /// The time samples of one attribute. A value that stays is kept by its first and its last frame.
 class Track {

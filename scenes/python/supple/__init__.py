@@ -9,9 +9,13 @@
     print(simulation.audits(), simulation.state_hash)
 
 Units are SI. Vectors are rows of arrays of shape (n, 3), quaternions rows x, y, z, w that map body axes to world axes.
+Without files: Scene({...}) takes a scene as a mapping, Field({...}) and contact(a, b) need no scene. supple.notebook shows pictures and
+films in Jupyter, supple.usd makes USD crates.
+
 Arrays that are called views show the library's own memory: they follow the simulation and cannot be written to.
 """
 from supple._errors import ContractViolation, Error, Fault
+from supple._library import library, library_scenes
 from supple._supple import *
 from supple._supple import __version__
 

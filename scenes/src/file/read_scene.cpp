@@ -211,6 +211,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   std::sort(scene.obstacles.begin(), scene.obstacles.end(), by_name);
   scene.source = folder / name;
   places->root = root;
+  places->source = {text, name, folder, {overrides.begin(), overrides.end()}};
   scene.places = places;
   const SceneKeys motion = motion_keys(scene, folder);
   scene.motion_keys = std::make_shared<const std::string>(text_of(motion));
@@ -218,6 +219,8 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   scene.picture_hash = hash_of(picture_keys(scene, folder));
   return scene;
 }
+
+const SceneSource* source_of(const Scene& scene) { return scene.places ? &scene.places->source : nullptr; }
 
 Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides) {
   std::error_code status;

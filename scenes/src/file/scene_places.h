@@ -11,6 +11,7 @@
 
 #include "file/yaml_tree.h"
 #include "supple/core/error.h"
+#include "supple/scenes/read_scene.h"
 #include "supple/scenes/scene.h"
 
 namespace supple::scenes {
@@ -19,6 +20,7 @@ struct ScenePlaces {
   SourceTexts texts;
   Tree tree;
   const Node* root = nullptr;
+  SceneSource source;
 };
 
 /// "file:line:column" of a key, or of the nearest one above it that is given; the file alone of a scene that was not read.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "output/animation_parts.h"
 #include "output/frame_looks.h"
 #include "output/frame_tables.h"
 #include "output/output_files.h"
@@ -89,10 +90,7 @@ FrameWriter::FrameWriter(const Scene& scene, const Model& model, const RunOption
   }
   if (outputs_.samples) samples_ = std::make_unique<SceneSamples>(scene.output.sampling, model.cell);
   if (!outputs_.meshes || !has(scene.output.mesh, MeshName::Usd)) return;
-  std::vector<io::UsdObject> objects;
-  for (const ObjectDesc& o : scene.objects) objects.push_back({o.name, o.colour, o.roughness});
-  for (const ObstacleDesc& o : scene.obstacles) objects.push_back({o.name, o.colour, o.roughness});
-  animation_ = std::make_unique<io::UsdAnimation>(options.folder / (name_ + ".usda"), scene.frame_rate, objects);
+  animation_ = std::make_unique<io::UsdAnimation>(options.folder / (name_ + ".usda"), scene.frame_rate, animated_objects(scene));
 }
 
 void FrameWriter::write(Simulation& simulation, Reporter& report, double done) {
@@ -123,7 +121,10 @@ void FrameWriter::write(Simulation& simulation, Reporter& report, double done, b
     (void)simulation.division();  // finds bulges that hold too little volume
     write_short_bulges(options_.folder, name_, frame, simulation.searches());
   }
-  if (animation_) add_to_animation(simulation, *meshes);
+  if (animation_) {
+    const AnimatedFrame shown(simulation);
+    animation_->add_frame(frame, shown.meshes(), shown.cameras());
+  }
   if (!files) return;
   if (outputs_.meshes) write_meshes(simulation, *meshes);
   if (grids) grids_.write(options_.folder, name_, frame, simulation);
@@ -233,21 +234,6 @@ void FrameWriter::write_meshes(const Simulation& simulation, const std::vector<M
     if (has(scene_.output.mesh, MeshName::Ply)) io::write_ply(path(".ply"), meshes[i]);
     if (has(scene_.output.mesh, MeshName::Obj)) io::write_obj(path(".obj"), meshes[i]);
   }
-}
-
-void FrameWriter::add_to_animation(const Simulation& simulation, const std::vector<Mesh>& meshes) {
-  std::vector<const Mesh*> all;
-  for (const Mesh& mesh : meshes) all.push_back(&mesh);
-  const std::vector<Mesh> obstacles = obstacle_meshes(scene_, simulation.model(), simulation.time());
-  for (const Mesh& mesh : obstacles) all.push_back(&mesh);
-  const std::vector<int> size = scene_.output.images ? scene_.output.images->size : ImagesDesc{}.size;
-  std::vector<io::UsdCamera> cameras;
-  for (const CameraDesc& desc : simulation.model().cameras) {
-    const render::Camera at = camera_at(desc, simulation.time(), scene_.duration);
-    cameras.push_back({desc.name.empty() ? "camera" : desc.name, at.from, at.look_at, at.up, at.field_of_view,
-                       static_cast<double>(size.at(0)) / size.at(1)});
-  }
-  animation_->add_frame(simulation.frame(), all, cameras);
 }
 
 void FrameWriter::write_tables(Simulation& simulation) {

@@ -68,7 +68,6 @@ class FrameWriter {
   void follow(Simulation& simulation, Reporter& report, double done);
   void write_meshes(const Simulation& simulation, const std::vector<Mesh>& meshes);
   void write_tables(Simulation& simulation);
-  void add_to_animation(const Simulation& simulation, const std::vector<Mesh>& meshes);
   std::filesystem::path make_film(const std::string& name, int last);
   /// @param what  of several tables in one folder: the part of their names after the scene's
   void write_time_list(const std::string& part, int last, const std::string& what = {});

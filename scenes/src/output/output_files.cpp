@@ -98,7 +98,7 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
   for (const std::string& stem : shown) {
     for (const char* end : {".mp4", "_sheet.png"}) old.push_back(folder / (stem + end));
   }
-  for (const char* end : {".usda", "_particles.pvd", "_contacts.pvd", "_pairs.pvd", "_samples.pvd"}) old.push_back(folder / (name + end));
+  for (const char* end : {".usda", ".glb", "_view.html", "_particles.pvd", "_contacts.pvd", "_pairs.pvd", "_samples.pvd"}) old.push_back(folder / (name + end));
   for (const char* report : {"result.json", "render.json", "export.json"}) old.push_back(folder / report);
   std::error_code ignored;
   for (const fs::path& path : old) fs::remove(path, ignored);

@@ -68,6 +68,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
   ordered_json json;
   json["scene"] = scene_name(scene);
   json["title"] = scene.title;
+  json["scene_file"] = std::filesystem::absolute(scene.source).string();
   json["outcome"] = result.outcome;
   json["reason"] = result.reason;
   json["exit_code"] = result.exit_code;

@@ -22,6 +22,21 @@ std::optional<SavedRange> saved_range(const fs::path& folder, const std::string&
   return SavedRange{first, last};
 }
 
+std::vector<int> saved_frames(const fs::path& folder, const Scene& scene, const std::set<int>& wanted) {
+  const std::string name = scene_name(scene);
+  const auto saved = saved_range(folder, name, scene.frame_count());
+  std::vector<int> frames;
+  for (int frame = saved ? saved->first : 1; saved && frame <= saved->last; ++frame) {
+    if ((wanted.empty() || wanted.contains(frame)) && fs::exists(state_path(folder, name, frame))) frames.push_back(frame);
+  }
+  if (!frames.empty()) return frames;
+  throw Error(ErrorKind::Io, Fault{.place = (folder / "states").string(),
+                                   .key = {},
+                                   .expected = "expected saved states of '" + name + (wanted.empty() ? "'" : "' at the requested frames"),
+                                   .found = "none",
+                                   .hint = "run the scene first: supple run SCENE --out FOLDER"});
+}
+
 State load_frame(const fs::path& folder, const Scene& scene, int frame) {
   const fs::path path = state_path(folder, scene_name(scene), frame);
   if (!fs::exists(path)) {

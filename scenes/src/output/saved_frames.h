@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,9 @@ struct SavedRange {
   int last = 1;
 };
 [[nodiscard]] std::optional<SavedRange> saved_range(const std::filesystem::path& folder, const std::string& name, int frame_count);
+
+/// Frames that are saved, ascending. @param wanted  those to choose from; empty: all   @throws Error{Io} where there are none
+[[nodiscard]] std::vector<int> saved_frames(const std::filesystem::path& folder, const Scene& scene, const std::set<int>& wanted);
 
 /// The state of a frame, for reading. @throws as load_state; Error{Io} where it is absent
 [[nodiscard]] State load_frame(const std::filesystem::path& folder, const Scene& scene, int frame);

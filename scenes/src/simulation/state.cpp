@@ -1,4 +1,5 @@
 #include "supple/scenes/state.h"
+#include "supple/scenes/state_bytes.h"
 
 #include <cstring>
 
@@ -159,7 +160,7 @@ std::uint64_t State::hash() const {
 
 StateOrigin origin_of(const Scene& scene) { return {scene.content_hash, scene.motion_keys}; }
 
-void save_state(const std::filesystem::path& path, const State& state, const StateOrigin& origin) {
+std::vector<std::byte> state_bytes(const State& state, const StateOrigin& origin) {
   StateWriter out;
   out.write(kMagic);
   out.write(kVersion);
@@ -189,11 +190,19 @@ void save_state(const std::filesystem::path& path, const State& state, const Sta
   save_record(out, state.record);
   const std::uint64_t check = hash_bytes(out.bytes());
   out.write(check);
-  io::write_atomically(path, std::span<const std::byte>(out.bytes()));
+  return {out.bytes().begin(), out.bytes().end()};
+}
+
+void save_state(const std::filesystem::path& path, const State& state, const StateOrigin& origin) {
+  io::write_atomically(path, std::span<const std::byte>(state_bytes(state, origin)));
 }
 
 State load_state(const std::filesystem::path& path, const StateOrigin& origin, const StateWanted& wanted) {
-  const std::vector<std::byte> bytes = io::read_file(path, kLargestFile);
+  return state_of_bytes(path.string(), io::read_file(path, kLargestFile), origin, wanted);
+}
+
+State state_of_bytes(const std::string& place, std::span<const std::byte> bytes, const StateOrigin& origin, const StateWanted& wanted) {
+  const std::filesystem::path path(place);
   if (bytes.size() < 4 * sizeof(std::uint64_t)) damaged(path, "a file of " + std::to_string(bytes.size()) + " bytes");
   const std::span<const std::byte> content(bytes.data(), bytes.size() - sizeof(std::uint64_t));
   std::uint64_t check = 0;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "supple/scenes/scene.h"
 
@@ -20,6 +21,16 @@ namespace supple::scenes {
 /// The same from text; `name` stands for the file in messages, files that the scene names are read from `folder`.
 [[nodiscard]] Scene parse_scene(const std::string& text, const std::string& name,
                                 const std::filesystem::path& folder, std::span<const std::string> overrides = {});
+
+/// What a scene was read from: `parse_scene` with these gives it again, as long as the files that it names are the same.
+struct SceneSource {
+  std::string text;
+  std::string name;                    ///< of the file
+  std::filesystem::path folder;
+  std::vector<std::string> overrides;
+};
+/// Null for a scene that was not read.
+[[nodiscard]] const SceneSource* source_of(const Scene& scene);
 
 /// The reference page of all keys (Markdown), and a JSON Schema, from the field lists that read scenes.
 [[nodiscard]] std::string scene_reference();

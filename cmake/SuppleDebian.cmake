@@ -1,0 +1,18 @@
+# The Debian package: cpack --config BUILD/CPackConfig.cmake -G DEB
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME supple)
+set(CPACK_PACKAGE_VENDOR supple)
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_MAINTAINER "The supple maintainers <maintainers@supple.invalid>")
+set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+# Opened at run time: OpenGL without a display, and the encoder of films.
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libosmesa6, ffmpeg")
+if(SUPPLE_BUILD_PYTHON)
+  set(CPACK_DEBIAN_PACKAGE_DEPENDS "python3, python3-numpy")
+endif()
+include(CPack)

@@ -1,0 +1,80 @@
+#include "view.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "library.h"
+#include "print.h"
+#include "supple/core/error.h"
+#include "supple/scenes/limits.h"
+#include "supple/scenes/read_scene.h"
+#include "view_server.h"
+
+namespace supple::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The scene file of a run, by its report. @throws Error{Io}
+std::string scene_of(const fs::path& folder) {
+  std::ifstream file(folder / "result.json");
+  const nlohmann::json report = nlohmann::json::parse(std::istreambuf_iterator<char>(file), {}, nullptr, false);
+  if (report.is_object() && report.contains("scene_file") && report["scene_file"].is_string()) return report["scene_file"];
+  throw Error(ErrorKind::Io, Fault{.place = (folder / "result.json").string(),
+                                   .key = {},
+                                   .expected = "expected the report of a run with its 'scene_file'",
+                                   .found = file.is_open() ? "none" : "no such file",
+                                   .hint = "name the scene instead: supple view SCENE --out " + folder.string()});
+}
+
+}  // namespace
+
+CLI::App* add_view(CLI::App& app, ViewArguments& a) {
+  CLI::App* verb = app.add_subcommand("view", "write a page that plays a run in a browser, or serve it");
+  verb->add_option("run", a.run, "run folder, or the scene with --out")->required();
+  verb->add_option("--set", a.set, "override a key, as the run did; may be repeated")->take_all();
+  verb->add_option("--out", a.out, "run folder, where a scene is named (default: out/NAME)");
+  verb->add_option("--page", a.page, "file to write (default: NAME_view.html in the run folder)");
+  verb->add_option("--frames", a.frames, "frames to show, e.g. 1-50,60,70-90:2 (default: all)");
+  verb->add_option("--cells", a.cells, "cells of the meshes along the longest side (default: as many as --size admits)")->check(CLI::Range(4, 1024));
+  verb->add_option_function<std::string>("--size", [&a](const std::string& text) { a.size = scenes::parse_bytes(text); }, "largest page, such as 20M (default: 9.5M)")
+      ->check([](const std::string& text) { return scenes::parse_bytes(text) > 0.0 ? std::string() : "expected a size > 0, such as 20M, found " + text; });
+  verb->add_option("--threads", a.threads, "number of threads (default: all); does not change the page")->check(CLI::Range(0, 1024));
+  verb->add_flag("--serve", a.serve, "serve the page to this machine until Control-C and follow a run that goes on");
+  verb->add_option("--port", a.port, "with --serve: port (default: any that is free)")->check(CLI::Range(0, 65535));
+  verb->add_option("--progress", a.progress, "auto, bar, plain or none")->check(CLI::IsMember({"auto", "bar", "plain", "none"}));
+  verb->add_flag("--quiet", a.quiet, "print warnings and errors only");
+  verb->footer("The page needs no network and no other file. Keys: space plays, arrows step.\n\nExample: supple view out/two_balls");
+  return verb;
+}
+
+int view(const ViewArguments& a, const std::atomic<int>& interrupt) {
+  const bool is_folder = fs::is_directory(a.run);
+  const scenes::Scene scene = scenes::read_scene(is_folder ? scene_of(a.run) : find_scene(a.run), a.set);
+  const fs::path folder = is_folder ? fs::path(a.run) : a.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(a.out);
+  if (a.serve) {
+    ViewServer server(scene, {.folder = folder, .port = a.port, .cells = a.cells > 0 ? a.cells : scenes::kFollowedViewCells, .interrupt = &interrupt});
+    fs::exists(folder / "result.json") ? server.end() : server.begin();
+    print(std::cout, "view:   %s (Control-C ends it)\n", server.address().c_str());
+    std::cout.flush();
+    server.wait();
+    return 0;
+  }
+  ProgressBar bar(a.quiet ? ProgressStyle::None : progress_style(a.progress));
+  scenes::ViewOptions options{.folder = folder, .page = a.page, .threads = a.threads, .cells = a.cells, .interrupt = &interrupt};
+  if (!a.frames.empty()) options.frames = scenes::parse_frames(a.frames);
+  if (a.size > 0.0) options.size = a.size;
+  options.progress = [&bar](const scenes::Progress& progress) { bar.show(progress); };
+  const scenes::ViewResult result = scenes::write_view(scene, options);
+  bar.finish();
+  if (!a.quiet) {
+    print(std::cout, "view:   %s (%d frames, %.1f MB, meshes of %d cells)\n", result.page.c_str(), result.frames, 1e-6 * static_cast<double>(result.bytes), result.cells);
+  }
+  return 0;
+}
+
+}  // namespace supple::tool
