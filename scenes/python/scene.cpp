@@ -16,17 +16,19 @@ std::vector<std::string> override_texts(const py::object& overrides) {
   return py::module_::import("supple._overrides").attr("texts")(overrides).cast<std::vector<std::string>>();
 }
 
-Scene read(const std::filesystem::path& path, const py::object& overrides) {
+using Paths = std::vector<std::filesystem::path>;
+
+Scene read(const std::filesystem::path& path, const py::object& overrides, const Paths& allowed) {
   const std::vector<std::string> texts = override_texts(overrides);
   const py::gil_scoped_release others_run;
-  return scenes::read_scene(path, texts);
+  return scenes::read_scene(path, texts, allowed);
 }
 
 Scene parse(const std::string& text, const py::object& overrides, const std::filesystem::path& folder,
-            const std::string& name) {
+            const std::string& name, const Paths& allowed) {
   const std::vector<std::string> texts = override_texts(overrides);
   const py::gil_scoped_release others_run;
-  return scenes::parse_scene(text, name, folder, texts);
+  return scenes::parse_scene(text, name, folder, texts, allowed);
 }
 
 std::vector<std::string> check(const Scene& scene) {
@@ -76,14 +78,15 @@ void bind_scene(py::module_& module) {
       });
 
   module.def(
-      "read_scene", &read, py::arg("path"), py::arg("overrides") = py::none(),
+      "read_scene", &read, py::arg("path"), py::arg("overrides") = py::none(), py::kw_only(), py::arg("allowed") = Paths(),
       "Reads and checks a scene file.\n\n"
       "overrides  {\"objects.ball.particles.mass\": 2} or [\"objects.ball.particles.mass=2\"]: keys that are set before the "
       "checks, as by\n"
-      "           `supple run --set`; objects by name. Values may be numbers, arrays, or texts such as \"5 cm\".\n\n"
+      "           `supple run --set`; objects by name. Values may be numbers, arrays, or texts such as \"5 cm\".\n"
+      "allowed    files and folders outside the scene's folder that the scene may read, after links are resolved\n\n"
       "Raises Error with every fault of the file, each with place, key, expectation, finding and hint.");
   module.def("parse_scene", &parse, py::arg("text"), py::arg("overrides") = py::none(), py::kw_only(),
-             py::arg("folder") = ".", py::arg("name") = "scene.yaml",
+             py::arg("folder") = ".", py::arg("name") = "scene.yaml", py::arg("allowed") = Paths(),
              "As read_scene, from text. `name` stands for the file in messages; files that the scene names are read from "
              "`folder`.");
   module.def("check", &check, py::arg("scene"),

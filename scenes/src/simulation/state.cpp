@@ -1,6 +1,8 @@
 #include "supple/scenes/state.h"
 
 #include <cstring>
+#include <optional>
+#include <span>
 
 #include "file/scene_keys.h"
 #include "output/program_identity.h"
@@ -107,6 +109,13 @@ Fault fault_of(const std::filesystem::path& path, std::string expected, std::str
                                                   "`supple run --resume` continues from the last good one before it"));
 }
 
+/// By its first bytes, so that a large file of another kind is not read.
+void expect_magic(const std::filesystem::path& path) {
+  std::uint64_t magic = 0;
+  const std::optional<std::size_t> size = io::read_start(path, std::as_writable_bytes(std::span(&magic, 1)));
+  if (size == sizeof magic && magic != kMagic) damaged(path, "another kind of file");
+}
+
 [[noreturn]] void refuse(const std::filesystem::path& path, std::string expected, std::string found, std::string hint) {
   throw Error(ErrorKind::Corrupt, fault_of(path, std::move(expected), std::move(found), std::move(hint)));
 }
@@ -193,6 +202,7 @@ void save_state(const std::filesystem::path& path, const State& state, const Sta
 }
 
 State load_state(const std::filesystem::path& path, const StateOrigin& origin, const StateWanted& wanted) {
+  expect_magic(path);
   const std::vector<std::byte> bytes = io::read_file(path, kLargestFile);
   if (bytes.size() < 4 * sizeof(std::uint64_t)) damaged(path, "a file of " + std::to_string(bytes.size()) + " bytes");
   const std::span<const std::byte> content(bytes.data(), bytes.size() - sizeof(std::uint64_t));
@@ -205,7 +215,6 @@ State load_state(const std::filesystem::path& path, const StateOrigin& origin, c
   std::string keys, program;
   in.read(magic);
   in.read(version);
-  if (magic != kMagic) refuse(path, "expected a saved state", "another kind of file", {});
   if (version != kVersion) {
     refuse(path, "expected a saved state of version " + std::to_string(kVersion),
            "version " + std::to_string(version) + ", of another version of supple", either("run the scene again", wanted.otherwise));
