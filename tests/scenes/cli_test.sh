@@ -181,7 +181,7 @@ for file in link.csv folder/points.csv ../elsewhere/points.csv "$PWD/elsewhere/p
   expect 0 '' run inside/names.yaml --allow-path elsewhere/points.csv --out allowed --overwrite --simulate-only --progress none
 done
 printf 'include: part.yaml\n%s\n' "$(grep -v duration good.yaml)" > inside/includes.yaml
-expect 3 "expected a file inside the scene's folder, found 'part.yaml'" check inside/includes.yaml
+expect 3 "expected a file inside the scene's folder, found a link to another place; --allow-path" check inside/includes.yaml
 expect 0 '' check inside/includes.yaml --allow-path elsewhere
 sed 's/^objects:/ground: {texture: {pattern: picture, file: link.csv}}\nobjects:/' good.yaml > inside/texture.yaml
 expect 4 "expected a file inside the scene's folder, found a link" check inside/texture.yaml

@@ -73,7 +73,6 @@ class Includes {
     };
     if (name.kind != Node::Kind::Scalar || name.text.empty()) return fail("expected the name of a file", name.described(), "");
     const std::filesystem::path path = folder / name.text;
-    if (!may_read(files_, path)) return fail(kInsideFolder, '\'' + shown(name.text) + '\'', kAllowHint);
     std::error_code unknown;
     const std::filesystem::path real = std::filesystem::weakly_canonical(std::filesystem::absolute(path, unknown), unknown);
     if (std::find(open_.begin(), open_.end(), real) != open_.end()) return fail("expected files that do not include one another in a circle", '\'' + shown(name.text) + '\'', "");
@@ -83,7 +82,8 @@ class Includes {
       expect_readable(files_, path);
       text = read_text(path);
     } catch (const Error& error) {
-      return fail(error.faults().front().expected, error.faults().front().found, "");
+      const Fault& fault = error.faults().front();
+      return fail(fault.expected, fault.found, fault.hint);
     }
     if (!text) return fail("expected a readable scene file", std::filesystem::exists(real, unknown) ? "a file that cannot be read" : "nothing", "");
     const std::uint32_t source = texts_.add(path.string(), std::move(*text), false);

@@ -67,7 +67,11 @@ void expect_readable(const FileAccess& files, const fs::path& path) {
   const auto fail = [&](std::string expected, std::string found, std::string hint) {
     throw Error(ErrorKind::Io, Fault{.place = path.string(), .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = std::move(hint)});
   };
-  if (!may_read(files, path)) fail(kInsideFolder, "a link to another place", kAllowHint);
+  if (!may_read(files, path)) {
+    const fs::path below = path.lexically_normal().lexically_relative(files.folder.lexically_normal());
+    const bool outside = !files.folder.empty() ? below.empty() || *below.begin() == ".." : path.is_absolute();
+    fail(kInsideFolder, outside ? "one outside of it" : "a link to another place", kAllowHint);
+  }
   std::error_code unknown;
   const fs::file_status status = fs::status(path, unknown);
   if (!fs::exists(status) || fs::is_regular_file(status)) return;  // an absent file is reported by its reader

@@ -304,8 +304,8 @@ TEST_F(HostileText, AliasBomb) {
 }
 TEST_F(HostileText, Cycle) { expect_refused("objects: &a [*a]\n", "that contains it"); }
 TEST_F(HostileText, AliasToAKey) {
-  EXPECT_EQ(parse("schema: 1\n&name title: *name\nduration: 1\nobjects: []\n").title, "title");
-  expect_refused("schema: 1\n&name objects:\n  - {name: a, contact: *name}\n", "found 'objects'");
+  EXPECT_EQ(parse("&name title: *name\n" + object_with("")).title, "title");
+  expect_refused("schema: 1\nduration: 1\n&name objects:\n  - {name: a, contact: *name}\n", "found 'objects'");
 }
 TEST_F(HostileText, DeepNesting) {
   std::string block;
