@@ -37,6 +37,11 @@ if(SUPPLE_SANITIZE)
     endif()
   endif()
 endif()
+# Coverage for the fuzz targets (tests/fuzz) to be led by.
+option(SUPPLE_FUZZ "Build the fuzz targets as programs of libFuzzer; clang only" OFF)
+if(SUPPLE_FUZZ)
+  target_compile_options(supple_flags INTERFACE -fsanitize=fuzzer-no-link)
+endif()
 
 # Precompiled headers: common includes are read once for all files with the same options, which saves a quarter to a third of the
 # compiler's time.

@@ -37,8 +37,10 @@ analyse() {
     xargs -P "$supple_jobs" -n 2 clang-tidy --quiet -p "$clang_build"
 }
 
+# All modules and the tool; the tests run each fuzz target for a minute.
 build_sanitizers() {
-  cd "$supple_root" && cmake --preset asan -B "$sanitizer_build" -DCMAKE_CXX_COMPILER=clang++ && cmake --build "$sanitizer_build"
+  cd "$supple_root" && cmake --preset asan -B "$sanitizer_build" -DCMAKE_CXX_COMPILER=clang++ -DSUPPLE_FUZZ=ON \
+    -DSUPPLE_MODULES="core;implicit;collision;render;scenes" -DSUPPLE_BUILD_TOOL=ON && cmake --build "$sanitizer_build"
 }
 test_sanitizers() { ctest --test-dir "$sanitizer_build" -j "$supple_jobs" --output-on-failure --no-tests=error; }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Stress tests: hostile and mutated inputs, failing memory and disks, kills, races, long runs. Rows and counts: docs/reliability.md.
-#   scripts/stress.sh [ROW...] [--seed N] [--share 0.1] [--report] [--self-test]     all rows when none is named, about an hour on two cores
+#   scripts/stress.sh [ROW...] [--seed N] [--share 0.1] [--jobs N] [--report] [--self-test]     all rows when none is named, about half an hour on two cores
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/dependencies.sh"

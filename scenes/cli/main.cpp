@@ -15,6 +15,7 @@
 #include <new>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -66,14 +67,19 @@ void on_signal(int number) {
   std::signal(number, SIG_DFL);
 }
 
+void ignore(int /*number*/) {}
+
+/// From the start of the program on. A handler instead of SIG_IGN for pipes that are closed at the other end, as programs that are started would inherit that.
 void heed_signals() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  std::signal(SIGPIPE, ignore);
 }
 
 struct Arguments {
   std::string scene;
   std::vector<std::string> set;
+  std::vector<fs::path> allowed;
   std::string out;
   std::optional<std::string> frames;
   std::string progress = "auto";
@@ -155,6 +161,7 @@ scenes::SimulationOptions simulation_options(int threads) {
 scenes::SimulationOptions question_options(int threads, double memory) {
   scenes::SimulationOptions options = simulation_options(threads);
   options.questions = true;
+  options.interrupt = &interrupted;
   if (memory > 0.0) options.memory = memory;
   return options;
 }
@@ -176,7 +183,6 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.delaunay = simulation_options(0).delaunay;
   options.progress = [&bar](const scenes::Progress& progress) { bar.show(progress); };
   options.interrupt = &interrupted;
-  heed_signals();
   return options;
 }
 
@@ -190,7 +196,7 @@ tool::ProgressBar make_bar(const Arguments& arguments) {
 
 scenes::Scene read_for_run(const Arguments& arguments) {
   try {
-    return scenes::read_scene(arguments.scene, arguments.set);
+    return scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
   } catch (const Error& error) {
     const std::string name = fs::path(arguments.scene).stem().string();
     scenes::leave_failure(arguments.out.empty() ? fs::path("out") / name : fs::path(arguments.out), name, error);
@@ -225,7 +231,7 @@ int run(const Arguments& arguments) {
 }
 
 int render(const Arguments& arguments) {
-  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
   if (arguments.sheet) {
     for (const auto& sheet : scenes::make_sheets(scene, folder_of(scene, arguments))) print(std::cout, "sheet:  %s\n", sheet.c_str());
     return 0;
@@ -244,7 +250,7 @@ int export_files(Arguments arguments) {
     frames_too = frames_too || !formats->empty();
     if (!formats->empty()) arguments.set.push_back("output." + std::string(key) + "=[" + *formats + ']');
   }
-  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
   tool::ProgressBar bar = make_bar(arguments);
   if (arguments.gltf) {
     const fs::path file = scenes::write_gltf(scene, run_options(arguments, folder_of(scene, arguments), bar));
@@ -258,7 +264,6 @@ int export_files(Arguments arguments) {
 }
 
 int compare(const Arguments& arguments) {
-  heed_signals();
   const scenes::Comparison result = scenes::compare_runs({.first = arguments.scene,
                                                           .second = arguments.other,
                                                           .folder = arguments.out.empty() ? "out/compare" : arguments.out,
@@ -277,9 +282,10 @@ int compare(const Arguments& arguments) {
 }
 
 int check(const Arguments& arguments) {
-  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
   const double build = arguments.memory > 0.0 ? arguments.memory : scenes::kCheckMemory;
-  const scenes::CheckReport found = scenes::check_scene(scene, question_options(1, arguments.memory), build);
+  const scenes::CheckReport found = scenes::check_scene(scene, question_options(1, arguments.memory), build,
+                                                         arguments.time_limit > 0.0 ? arguments.time_limit : scenes::kCheckSeconds);
   for (const std::string& warning : found.warnings) print(std::cerr, "warning: %s\n", warning.c_str());
   if (!arguments.quiet) {
     const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
@@ -292,7 +298,7 @@ int check(const Arguments& arguments) {
 }
 
 int explain(const Arguments& arguments) {
-  scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
   if (arguments.simulate_only) scene.output = {};
   scenes::Simulation simulation(std::move(scene), question_options(1, arguments.memory));
   std::cout << scenes::explain(simulation);
@@ -300,7 +306,7 @@ int explain(const Arguments& arguments) {
 }
 
 int query(const Arguments& arguments) {
-  scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+  scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
   if (arguments.error > 0.0) scene.contact.error = arguments.error;
   const scenes::StateOrigin origin = scenes::origin_of(scene);
   scenes::Simulation simulation(std::move(scene), question_options(arguments.threads, arguments.memory));
@@ -336,6 +342,7 @@ int bench(const Arguments& arguments) {
 void scene_option(CLI::App* verb, Arguments& a) {
   verb->add_option("scene", a.scene, "scene file (YAML)")->required();
   verb->add_option("--set", a.set, "override a key, e.g. --set objects.ball.particles.mass=2; may be repeated")->take_all();
+  verb->add_option("--allow-path", a.allowed, "file or folder outside the scene's folder that the scene may read; may be repeated")->take_all();
 }
 
 void run_flags(CLI::App* verb, Arguments& a) {
@@ -367,6 +374,11 @@ void memory_flag(CLI::App* verb, Arguments& a, const std::string& what) {
   verb->add_option_function<std::string>("--memory", [&a](const std::string& text) { a.memory = scenes::parse_bytes(text); }, what)->check(bytes);
 }
 
+void time_flag(CLI::App* verb, Arguments& a, const std::string& what) {
+  verb->add_option("--time-limit", a.time_limit, what)
+      ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
+}
+
 void drawing_flags(CLI::App* verb, Arguments& a) {
   verb->add_option("--at-once", a.at_once, "frames drawn at the same time (default: one per thread, as memory allows); does not change results")
       ->check(CLI::Range(0, 64));
@@ -389,8 +401,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_verb->add_flag("--resume", a.resume, "continue from the saved states in the folder; frames whose states are lost or damaged are simulated again");
   run_verb->add_flag("--simulate-only", a.simulate_only, "no pictures, film, meshes, grids or samples");
   drawing_flags(run_verb, a);
-  run_verb->add_option("--time-limit", a.time_limit, "stop after this many seconds, between two steps; --resume continues from the last saved state")
-      ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
+  time_flag(run_verb, a, "stop after this many seconds, between two steps; --resume continues from the last saved state");
   run_verb->add_flag("--view", a.view, "serve a page to this machine that follows the run (`supple view`)");
   run_verb->add_option("--port", a.port, "with --view: port of the page (default: any that is free)")->check(CLI::Range(0, 65535));
   run_verb->add_flag("--render-only", a.render_only, "draw pictures and film from the saved states of an earlier run, as `supple render` does");
@@ -437,6 +448,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   scene_option(check_verb, a);
   check_verb->add_flag("--quiet", a.quiet, "print warnings and errors only");
   memory_flag(check_verb, a, "limit of memory of the check (default: 200M); of a scene that needs more only the counts are checked");
+  time_flag(check_verb, a, "limit of processor time for building the scene and its first contacts (default: 0.7 s)");
   check_verb->footer("Example: supple check my_scene.yaml");
 
   CLI::App* explain_verb = app.add_subcommand("explain", "print which stages a scene runs, each with the reason");
@@ -495,7 +507,9 @@ int parse_and_call(int argc, char** argv, bool silent) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
     tool::expect_known_words(app, std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
-    app.exit(error);
+    std::ostringstream text;
+    app.exit(error, text, text);
+    std::cerr << tool::printable_lines(text.str());
     return kUsage;
   }
   a.words = bench_verb->remaining();
@@ -514,7 +528,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   if (render_verb->parsed()) return render(a);
   if (export_verb->parsed()) return export_files(a);
   if (info_verb->parsed()) {
-    std::cout << scenes::describe_run(a.scene);
+    std::cout << tool::printable_lines(scenes::describe_run(a.scene));
     return 0;
   }
   if (compare_verb->parsed()) return compare(a);
@@ -546,6 +560,7 @@ void flush_output() {
 /// @param silent  standard output is closed   @return the exit code
 int call(int argc, char** argv, bool silent) {
   try {
+    const InterruptScope scope(&interrupted);
     const int code = parse_and_call(argc, argv, silent);
     flush_output();
     return code;
@@ -554,9 +569,10 @@ int call(int argc, char** argv, bool silent) {
     std::cerr << error.what() << '\n';
     return static_cast<int>(error.kind());
   } catch (const supple::Interrupted&) {
+    std::cerr << "interrupted by signal " << interrupted << '\n';
     return kSignalExit + interrupted;
   } catch (const std::filesystem::filesystem_error& error) {
-    std::cerr << error.what() << '\n';
+    std::cerr << tool::printable_lines(error.what()) << '\n';
     return static_cast<int>(supple::ErrorKind::Io);
   } catch (const std::bad_alloc&) {
     std::cerr << supple::scenes::kOutOfMemory << '\n';
@@ -570,6 +586,7 @@ int call(int argc, char** argv, bool silent) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  heed_signals();
   // Before any file is opened: it would get the number of a closed standard stream, and the text that is printed there.
   const bool silent = supple::io::occupy_standard_descriptors()[STDOUT_FILENO];
   std::signal(SIGCHLD, SIG_DFL);  // our parent may ignore it, which hides how ffmpeg ends

@@ -16,33 +16,37 @@ std::vector<std::string> override_texts(const py::object& overrides) {
   return py::module_::import("supple._overrides").attr("texts")(overrides).cast<std::vector<std::string>>();
 }
 
-Scene read(const std::filesystem::path& path, const py::object& overrides) {
+using Paths = std::vector<std::filesystem::path>;
+
+Scene read(const std::filesystem::path& path, const py::object& overrides, const Paths& allowed) {
   const std::vector<std::string> texts = override_texts(overrides);
   const py::gil_scoped_release others_run;
-  return scenes::read_scene(path, texts);
+  return scenes::read_scene(path, texts, allowed);
 }
 
 Scene parse(const std::string& text, const py::object& overrides, const std::filesystem::path& folder,
-            const std::string& name) {
+            const std::string& name, const Paths& allowed) {
   const std::vector<std::string> texts = override_texts(overrides);
   const py::gil_scoped_release others_run;
-  return scenes::parse_scene(text, name, folder, texts);
+  return scenes::parse_scene(text, name, folder, texts, allowed);
 }
 
 /// From a mapping with the keys of a scene file.
-Scene make(const py::object& description, const py::object& overrides, const std::filesystem::path& folder, const std::string& name) {
-  return parse(py::module_::import("supple._scenes").attr("scene_text")(description).cast<std::string>(), overrides, folder, name);
+Scene make(const py::object& description, const py::object& overrides, const std::filesystem::path& folder, const std::string& name,
+           const Paths& allowed) {
+  return parse(py::module_::import("supple._scenes").attr("scene_text")(description).cast<std::string>(), overrides, folder, name, allowed);
 }
 
 py::tuple recipe_of(const Scene& scene) {
   const scenes::SceneSource* const source = scenes::source_of(scene);
   if (source == nullptr) throw py::type_error("this scene was not read, so it cannot be pickled");
-  return py::make_tuple(source->text, source->name, source->folder, source->overrides);
+  return py::make_tuple(source->text, source->name, source->folder, source->overrides, source->allowed);
 }
 
 Scene scene_of(const py::tuple& recipe) {
   const auto overrides = recipe[3].cast<std::vector<std::string>>();
-  return scenes::parse_scene(recipe[0].cast<std::string>(), recipe[1].cast<std::string>(), recipe[2].cast<std::filesystem::path>(), overrides);
+  return scenes::parse_scene(recipe[0].cast<std::string>(), recipe[1].cast<std::string>(), recipe[2].cast<std::filesystem::path>(), overrides,
+                             recipe[4].cast<Paths>());
 }
 
 std::vector<std::string> check(const Scene& scene) {
@@ -69,8 +73,9 @@ void bind_scene(py::module_& module) {
   py::class_<Scene, std::shared_ptr<Scene>>(
       module, "Scene", "The checked content of a scene. It is immutable; to change a value, make it again with overrides.")
       .def(py::init(&make), py::arg("description"), py::arg("overrides") = py::none(), py::kw_only(), py::arg("folder") = ".", py::arg("name") = "scene.yaml",
+           py::arg("allowed") = Paths{},
            "From a mapping with the keys of scene files, whose values are numbers, texts such as \"5 cm\", lists, arrays and mappings.\n\n"
-           "overrides  as in read_scene\nfolder     where files that the scene names are\nname       stands for a file in messages, and names outputs\n\n"
+           "overrides  as in read_scene\nfolder     where files that the scene names are\nname       stands for a file in messages, and names outputs\nallowed    as in read_scene\n\n"
            "Raises Error with every fault, each with key, expectation, finding and hint.")
       .def(py::pickle(&recipe_of, &scene_of))
       .def("__copy__", [](const py::object& self) { return self; })
@@ -99,14 +104,15 @@ void bind_scene(py::module_& module) {
       });
 
   module.def(
-      "read_scene", &read, py::arg("path"), py::arg("overrides") = py::none(),
+      "read_scene", &read, py::arg("path"), py::arg("overrides") = py::none(), py::kw_only(), py::arg("allowed") = Paths(),
       "Reads and checks a scene file.\n\n"
       "overrides  {\"objects.ball.particles.mass\": 2} or [\"objects.ball.particles.mass=2\"]: keys that are set before the "
       "checks, as by\n"
-      "           `supple run --set`; objects by name. Values may be numbers, arrays, or texts such as \"5 cm\".\n\n"
+      "           `supple run --set`; objects by name. Values may be numbers, arrays, or texts such as \"5 cm\".\n"
+      "allowed    files and folders outside the scene's folder that the scene may read, after links are resolved\n\n"
       "Raises Error with every fault of the file, each with place, key, expectation, finding and hint.");
   module.def("parse_scene", &parse, py::arg("text"), py::arg("overrides") = py::none(), py::kw_only(),
-             py::arg("folder") = ".", py::arg("name") = "scene.yaml",
+             py::arg("folder") = ".", py::arg("name") = "scene.yaml", py::arg("allowed") = Paths(),
              "As read_scene, from text. `name` stands for the file in messages; files that the scene names are read from "
              "`folder`.");
   module.def("check", &check, py::arg("scene"),

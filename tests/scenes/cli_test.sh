@@ -4,6 +4,7 @@
 set -u
 supple=$1
 scratch=$2
+hostile=$(cd "$(dirname "$0")" && pwd)/hostile
 broken_calls=$3
 rm -rf "$scratch"
 mkdir -p "$scratch"
@@ -56,7 +57,7 @@ expect 2 "found 'simulate'; known: run, render, export, info, compare, check, ex
 expect 2 "supple: expected an option, found '--verson'; did you mean '--version'?" --verson
 expect 2 "supple run: expected an option, found '--thread'; did you mean '--threads'?" run good.yaml --thread 2
 expect 2 "supple run: expected an option, found '-out'; did you mean '--out'?" run -out elsewhere good.yaml
-expect 2 "supple check: expected an option, found '--camera'; known: --help, --set, --quiet" check good.yaml --camera=left
+expect 2 "supple check: expected an option, found '--camera'; known: --help, --set, --allow-path, --quiet" check good.yaml --camera=left
 expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
 expect 2 '1 to 3' run good.yaml --out frames --frames 9 --progress none
 expect 2 '--memory' run good.yaml --out frames --memory nan --progress none
@@ -155,6 +156,81 @@ for file in pipe.csv ../good.yaml /etc/hostname '"p.csv\0x"'; do
   [[ $code == 3 || $code == 4 ]] && grep -qE 'expected a (regular file|file inside)' err.txt || fault "check with file $file: exit $code, $(cat err.txt)"
 done
 rm pipe.csv
+# Links, and allowed files. Nothing of a file elsewhere is shown.
+mkdir -p inside elsewhere
+echo '0, 0, 0' > elsewhere/points.csv
+printf 'duration: 0.2 s\n' > elsewhere/part.yaml
+ln -s ../elsewhere/points.csv inside/link.csv
+ln -s ../elsewhere/part.yaml inside/part.yaml
+ln -s ../elsewhere inside/folder
+ln -s /etc/passwd inside/secret.csv
+names() {
+  printf '%s\nobjects:\n  - name: ball\n    particles: {arrange: file, file: %s}\n    skeleton: [{shape: point, kernel: {radius: 0.5}}]\n' "$head_text" "$1" > inside/names.yaml
+}
+for file in link.csv secret.csv folder/points.csv; do
+  names $file
+  expect 4 "inside/$file: objects.ball.particles.file: expected a file inside the scene's folder, found a link to another place; --allow-path" check inside/names.yaml
+  ! grep -q root err.txt || fault "check with file $file shows what is in it: $(cat err.txt)"
+done
+names ../elsewhere/points.csv
+expect 3 "expected a file inside the scene's folder, found '../elsewhere/points.csv'; --allow-path" check inside/names.yaml
+expect 3 "expected a file inside the scene's folder" check inside/names.yaml --allow-path inside
+for file in link.csv folder/points.csv ../elsewhere/points.csv "$PWD/elsewhere/points.csv"; do
+  names "$file"
+  expect 0 '' check inside/names.yaml --allow-path elsewhere
+  expect 0 '' run inside/names.yaml --allow-path elsewhere/points.csv --out allowed --overwrite --simulate-only --progress none
+done
+printf 'include: part.yaml\n%s\n' "$(grep -v duration good.yaml)" > inside/includes.yaml
+expect 3 "expected a file inside the scene's folder, found a link to another place; --allow-path" check inside/includes.yaml
+expect 0 '' check inside/includes.yaml --allow-path elsewhere
+sed 's/^objects:/ground: {texture: {pattern: picture, file: link.csv}}\nobjects:/' good.yaml > inside/texture.yaml
+expect 4 "expected a file inside the scene's folder, found a link" check inside/texture.yaml
+# Names of scenes are names of files and of folders.
+cp good.yaml ...yaml
+expect 4 'found a name that begins with a dot' run ...yaml --progress none
+[[ ! -e states && ! -e out ]] || fault 'a scene named ...yaml writes outside its folder'
+rm ...yaml
+# Control characters of names and words do not reach the terminal.
+escape=$'\e]0;x\a\302\233m'
+for words in "check $escape.yaml" "$escape" "check good.yaml --$escape" "check good.yaml --memory $escape" "run good.yaml --progress $escape" \
+    "run good.yaml --frames $escape" "run good.yaml --set $escape=1" "info $escape" "new $escape" "query forces good.yaml --state $escape" \
+    "run good.yaml --simulate-only --out $escape"; do
+  "$supple" $words > out.txt 2>&1 < /dev/null
+  ! grep -qP '[\x00-\x08\x0b-\x1f\x7f]|\xc2[\x80-\x9f]' out.txt || fault "supple ${words@Q} prints control characters: $(cat -v out.txt)"
+done
+rm -r "$escape"
+# Sizes and kinds before content: a large file that is no state is not read.
+truncate -s 3G large
+(ulimit -v 1000000; "$supple" query forces good.yaml --state large > out.txt 2> err.txt)
+code=$?
+[[ $code == 7 ]] && grep -qF 'another kind of file' err.txt || fault "query --state of a large file: exit $code, $(cat err.txt)"
+(ulimit -v 1000000; "$supple" query field good.yaml --points large > out.txt 2> err.txt)
+code=$?
+[[ $code == 6 ]] || fault "query --points of a large file: exit $code, $(cat err.txt)"
+rm large
+
+# Progress that nobody reads any more: the run goes on. The reader leaves before the first line.
+mkfifo progress
+"$supple" run good.yaml --out unread --progress plain > out.txt 2> progress &
+run=$!
+exec 3< progress
+exec 3<&-
+wait "$run"
+code=$?
+[[ $code == 0 ]] && grep -q '"outcome": "done"' unread/result.json || fault "run whose progress is not read: exit $code"
+rm progress
+# Signals from the first line on: a check ends, too.
+for signal in INT TERM; do
+  "$supple" check "$hostile/huge_ball_about_a_spiral.yaml" --set objects.spiral.particles.count=80 --time-limit 600 > out.txt 2> err.txt &
+  run=$!
+  sleep 0.3
+  kill -s $signal "$run" 2> /dev/null
+  wait "$run"
+  code=$?
+  [[ $signal == INT && $code == 130 || $signal == TERM && $code == 143 ]] || fault "signal $signal to a check: exit $code, $(cat err.txt)"
+done
+expect 0 'takes more than the limit of 0.1 s of processor time of a check; --time-limit raises the limit' check "$hostile/huge_ball_about_a_spiral.yaml" --time-limit 0.1
+expect 2 '--time-limit' check good.yaml --time-limit 0
 
 # Standard streams that are closed: what is printed lands in no file of the run.
 sed 's/^objects:/output: {mesh: [ply, usd], cell: 0.1}\nobjects:/' good.yaml > meshes.yaml

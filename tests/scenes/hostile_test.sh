@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Scenes that ask for far too much: `supple check` answers each as NAME.txt says, in a second and 256 MB.
 #   hostile_test.sh SUPPLE FOLDER [--write]
-# NAME.txt: the exit code, then the first line of the answer. --write replaces these files.
+# NAME.txt: the exit code, then the first line of the answer; or "any answer" where it depends on the speed of the machine. --write replaces the others.
 set -u
 supple=$1
 folder=$2
@@ -49,10 +49,13 @@ for scene in *.yaml; do
   kilobytes=$(sed -n 1p <<< "$answer")
   seconds=$(sed -n 2p <<< "$answer")
   found=$(sed -n '3,4p' <<< "$answer")
-  if [[ $write == --write ]]; then
+  any=$(grep -c '^any answer$' "$name.txt" 2> /dev/null)
+  if [[ $write == --write && $any != 1 ]]; then
     printf '%s\n' "$found" > "$name.txt"
   fi
-  if [[ ! -f $name.txt ]] || [[ $found != "$(cat "$name.txt")" ]]; then
+  if [[ $any == 1 ]]; then
+    [[ ${found%%$'\n'*} =~ ^[0346]$ ]] || { echo "$scene: found $found"; failures=$((failures + 1)); }
+  elif [[ ! -f $name.txt ]] || [[ $found != "$(cat "$name.txt")" ]]; then
     printf '%s: expected\n%s\nfound\n%s\n' "$scene" "$(cat "$name.txt" 2> /dev/null)" "$found"
     failures=$((failures + 1))
   fi

@@ -1,4 +1,5 @@
 """Hostile and mutated inputs: thousands for the libraries (stress_inputs), and some of them for the tool."""
+import concurrent.futures
 import json
 import os
 import re
@@ -11,18 +12,28 @@ RUN_MEMORY = 6 << 30
 
 
 def by_libraries(what, context, asked):
-    folder = context.folder(what)
+    """Inputs are told by seed and number: parts of them run at the same time."""
     outcome = Outcome()
-    ended = run_process([context.bin / "stress_inputs", what, "--count", asked, "--seed", context.seed, "--sources", context.sources, "--scratch", folder],
-                        timeout=24 * 3600)
-    try:
-        told = json.loads(ended.out)
-    except ValueError:
-        outcome.faults.append(f"stress_inputs ended with {ended.code}: {ended.err[:300]}")
-        return outcome
-    outcome.reached = told["tried"]
-    outcome.faults = [f"{fault['what']} ({fault['file'] or fault['number']})" for fault in told["faults"]]
-    outcome.note = f"{told['refused']} refused"
+    parts = min(context.jobs, asked)
+    bounds = [part * asked // parts for part in range(parts + 1)]
+
+    def run_part(first, end):
+        return run_process([context.bin / "stress_inputs", what, "--first", first, "--count", end - first, "--seed", context.seed, "--sources", context.sources,
+                            "--scratch", context.folder(f"{what}_{first}")], timeout=24 * 3600)
+
+    with concurrent.futures.ThreadPoolExecutor(parts) as pool:
+        all_ended = list(pool.map(run_part, bounds[:-1], bounds[1:]))
+    refused = 0
+    for ended in all_ended:
+        try:
+            told = json.loads(ended.out)
+        except ValueError:
+            outcome.faults.append(f"stress_inputs ended with {ended.code}: {ended.err[:300]}")
+            continue
+        outcome.reached += told["tried"]
+        outcome.faults += [f"{fault['what']} ({fault['file'] or fault['number']})" for fault in told["faults"]]
+        refused += told["refused"]
+    outcome.note = f"{refused} refused"
     return outcome
 
 
@@ -78,7 +89,7 @@ def hostile_texts():
     bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 12))
     particles = lambda text: HEAD + f"objects:\n  - {{name: ball, particles: {text}, skeleton: [{{shape: point, kernel: {{radius: 0.1}}}}]}}\n"
     texts = {
-        "alias_bomb": bomb, "cycle": "a: &a [*a]\n", "merge": HEAD + "<<: {a: 1}\n", "documents": HEAD + BALL + "---\n" + HEAD + BALL,
+        "alias_bomb": bomb, "alias_of_a_key": HEAD + "&key " + BALL.replace("contact: {}", "contact: *key"), "cycle": "a: &a [*a]\n", "merge": HEAD + "<<: {a: 1}\n", "documents": HEAD + BALL + "---\n" + HEAD + BALL,
         "nothing": "", "zeros": "\0" * 1000, "byte_order": "\xef\xbb\xbf" + HEAD, "deep": "a: " + "[" * 200000, "wide": "a: [" + "1," * 300000 + "1]\n",
         "long_key": "x" * 1000000 + ": 1\n", "big": HEAD + "title: " + "x" * (9 << 20) + "\n", "tabs": HEAD.replace(" ", "\t"), "tag": HEAD + "!!python/object a: 1\n",
         "count_1e9": particles("{arrange: line, count: 1000000000, spacing: 0.1}"), "grid_1e9": particles("{arrange: grid, columns: 40000, rows: 40000, spacing: 0.1}"),

@@ -112,3 +112,21 @@ def contacts(context, asked):
     outcome.note = (f"and {told['apart']} pairs apart; largest relative errors: forces {told['forces']:.0e}, moments {told['moments']:.0e}, "
                     f"pressures {told['pressures']:.0e}, surfaces {told['surfaces']:.0e}")
     return outcome
+
+
+FUZZ_TARGETS = {"mesh": 1.0, "csv": 1.0, "png": 1.0, "state": 1.0, "scene": 0.01}  # share of the inputs, as some take far longer
+
+
+def fuzz(context, asked):
+    """The fuzz targets without libFuzzer: their corpora, with changes. Each ends where an input is neither used nor refused."""
+    outcome = Outcome()
+    for name, share in FUZZ_TARGETS.items():
+        corpus = context.sources / "tests/fuzz/corpus" / name
+        changes = max(1, int(share * asked / len(FUZZ_TARGETS) / len(list(corpus.iterdir()))))
+        folder = context.folder("fuzz_" + name)
+        ended = run_process([context.bin / ("fuzz_" + name), "--changes", changes, corpus], timeout=LONG_S, cwd=folder)
+        tried = re.search(r"^(\d+) inputs", ended.out)
+        outcome.reached += int(tried.group(1)) if tried else 0
+        if ended.code != 0:
+            outcome.faults.append(f"fuzz_{name} ended with {ended.code} ({folder}/fuzz_input): {ended.err[:200]}")
+    return outcome

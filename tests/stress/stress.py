@@ -1,5 +1,6 @@
 """Stress tests: the rows of docs/reliability.md. Called by scripts/stress.sh, which builds their programs."""
 import argparse
+import concurrent.futures
 import dataclasses
 import datetime
 import functools
@@ -42,6 +43,7 @@ ROWS = [
     Row("tool", "mutated scenes by the command line: check, then run under a time limit", 500, "scenes", rows_inputs.mutated_by_tool),
     Row("hostile", "hostile scenes and golden messages: refused in 1 s and 256 MB", 250, "scenes", rows_inputs.hostile),
     Row("files", "meshes (OBJ, PLY, OFF, STL) and tables (CSV), mutated", 2_000, "files", functools.partial(rows_inputs.by_libraries, "files")),
+    Row("fuzz", "fuzz targets (mesh, CSV, PNG, scene, state with a right checksum): corpora with changes; used or refused", 50_000, "inputs", rows_programs.fuzz),
     Row("state-bytes", "saved states with altered bytes, by the library: refused", 10_000, "states", functools.partial(rows_inputs.by_libraries, "states")),
     Row("states", "saved states altered or exchanged, by `run --resume`, `render`, `export`: refused with 7, or simulated again to the same bits", 1_000, "commands", rows_runs.states),
     Row("frames", "lists of frames for `--frames`", 100_000, "lists", functools.partial(rows_inputs.by_libraries, "frames")),
@@ -109,7 +111,7 @@ HEAD = """# Reliability
 
 When a run is killed, the disk fills or a scene is hostile, no saved frame is lost, no incomplete file appears under a final name, and a message
 says what happened and what to do. `scripts/stress.sh` tests this row by row; `--report` updates the lines of the rows that
-it ran. "Planned" is the number of trials of a full run, "made" that of the last run. `scripts/stress.sh --self-test`
+it ran, as many at the same time as there are processors. "Planned" is the number of trials of a full run, "made" that of the last run. `scripts/stress.sh --self-test`
 plants faults and checks that they are found.
 
 | row | test | planned | made | failures | time [s] | date, commit | command |
@@ -127,6 +129,21 @@ def write_report(lines):
     REPORT.write_text(HEAD + "".join(known.get(row.name, never(row)) + "\n" for row in ROWS))
 
 
+def run_rows(rows, context, report):
+    """Runs rows, some at the same time: they are judged by processor time, and have folders of their own. @return whether one failed"""
+    lines, failed = {}, False
+    with concurrent.futures.ThreadPoolExecutor(context.jobs) as pool:
+        running = {pool.submit(run_row, row, context): row for row in rows}
+        for done in concurrent.futures.as_completed(running):
+            row, (asked, outcome, seconds) = running[done], done.result()
+            tell(row, asked, outcome, seconds)
+            lines[row.name] = report_line(row, context, outcome, seconds)
+            failed = failed or bool(outcome.faults)
+            if report:
+                write_report(lines)  # at once: what follows may take long
+    return failed
+
+
 def main():
     parser = argparse.ArgumentParser(prog="scripts/stress.sh", description="Runs stress tests, row by row: " + ", ".join(row.name for row in ROWS) + ".")
     parser.add_argument("rows", nargs="*", metavar="ROW", help="all when none is named")
@@ -134,6 +151,7 @@ def main():
     parser.add_argument("--share", type=float, default=1.0, help="share of the planned numbers, e.g. 0.1")
     parser.add_argument("--report", action="store_true", help="write the lines of these rows into docs/reliability.md")
     parser.add_argument("--build", default=str(SOURCES / "build/release"), help="build folder (default build/release)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="rows at the same time (default: one per processor)")
     parser.add_argument("--self-test", action="store_true", help="plant faults and expect every row that is tried to find them")
     arguments = parser.parse_args()
     unknown = set(arguments.rows) - {row.name for row in ROWS}
@@ -142,21 +160,12 @@ def main():
     if not 0.0 < arguments.share <= 1.0:
         parser.error("--share: expected a number above 0, at most 1")
     scratch = pathlib.Path(arguments.build) / "stress" / str(os.getpid())
-    context = Context(SOURCES, arguments.build, scratch, arguments.seed, arguments.share)
+    context = Context(SOURCES, arguments.build, scratch, arguments.seed, arguments.share, max(1, arguments.jobs))
     if arguments.self_test:
         import self_test
         failed = self_test.run(context)
     else:
-        lines, failed = {}, False
-        for row in ROWS:
-            if arguments.rows and row.name not in arguments.rows:
-                continue
-            asked, outcome, seconds = run_row(row, context)
-            tell(row, asked, outcome, seconds)
-            lines[row.name] = report_line(row, context, outcome, seconds)
-            failed = failed or bool(outcome.faults)
-            if arguments.report:
-                write_report(lines)  # at once: what follows may take an hour
+        failed = run_rows([row for row in ROWS if not arguments.rows or row.name in arguments.rows], context, arguments.report)
     if failed:
         print(f"what shows the faults is in {scratch}")
     else:

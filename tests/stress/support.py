@@ -39,14 +39,15 @@ class Ended:
 class Context:
     """Paths, and the numbers of trials."""
 
-    def __init__(self, sources, build, scratch, seed, share):
+    def __init__(self, sources, build, scratch, seed, share, jobs=1):
         self.sources = pathlib.Path(sources)
-        self.build = pathlib.Path(build)
+        self.build = pathlib.Path(build).resolve()
         self.bin = self.build / "bin"
         self.tool = os.environ.get("SUPPLE_STRESS_TOOL", str(self.bin / "supple"))
         self.scratch = pathlib.Path(scratch)
         self.seed = seed
         self.share = share
+        self.jobs = jobs
 
     def folder(self, name):
         """A new, empty folder."""

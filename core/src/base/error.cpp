@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "supple/core/printable.h"
+
 namespace supple {
 namespace {
 
@@ -15,24 +17,6 @@ std::size_t character_length(std::string_view text) {
     if ((byte(k) & 0xC0U) != 0x80U) return 0;
   }
   return length;
-}
-
-/// Names and contents of files may contain anything: control characters and invalid text are shown by their bytes.
-std::string printable(std::string_view text) {
-  std::string out;
-  while (!text.empty()) {
-    const auto byte = static_cast<unsigned char>(text.front());
-    const std::size_t length = byte < 0x20 || byte == 0x7F ? 0 : character_length(text);
-    if (length == 0) {
-      constexpr std::string_view kDigits = "0123456789abcdef";
-      out.append("\\x") += kDigits[byte >> 4U];
-      out += kDigits[byte & 15U];
-    } else {
-      out += text.substr(0, length);
-    }
-    text.remove_prefix(std::max<std::size_t>(length, 1));
-  }
-  return out;
 }
 
 std::string join(const std::vector<Fault>& faults) {
@@ -49,7 +33,33 @@ std::vector<Fault> require_some(std::vector<Fault> faults) {
   return faults;
 }
 
+/// Of a valid character: C1 controls start sequences on some terminals, as ESC does.
+bool is_control(std::string_view character) {
+  const auto first = static_cast<unsigned char>(character.front());
+  return first < 0x20U || first == 0x7FU || (first == 0xC2U && static_cast<unsigned char>(character[1]) < 0xA0U);
+}
+
 }  // namespace
+
+std::string printable(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t length = character_length(text);
+    const std::string_view character = text.substr(0, std::max<std::size_t>(length, 1));
+    if (length == 0 || is_control(character)) {
+      constexpr std::string_view kDigits = "0123456789abcdef";
+      for (const char c : character) {
+        const auto byte = static_cast<unsigned char>(c);
+        out.append("\\x") += kDigits[byte >> 4U];
+        out += kDigits[byte & 15U];
+      }
+    } else {
+      out += character;
+    }
+    text.remove_prefix(character.size());
+  }
+  return out;
+}
 
 std::string Fault::message() const {
   std::string text = place;

@@ -117,8 +117,8 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t 
   const auto size = static_cast<std::size_t>(status.st_size);
   if (size > limit) refuse(size);
 
-  // The size is a hint only: pipes report 0, and a file may grow while it is read.
-  std::vector<std::byte> bytes(size);
+  // The size is a hint only: pipes report 0, and a file may grow while it is read. With room for one byte more, the end is found without growing.
+  std::vector<std::byte> bytes(size + 1);
   std::size_t used = 0;
   for (;;) {
     if (used == bytes.size()) bytes.resize(used + 4096);

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "file/processor_limit.h"
 #include "file/read_scene_faults.h"
 #include "model/crowded_start.h"
+#include "supple/core/interrupt.h"
 #include "supple/scenes/output_limits.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/run.h"
@@ -23,6 +25,11 @@ std::string not_built(const SceneCounts& counts, double build) {
 std::string not_solved(const CrowdedStart& crowd) {
   return crowd.key + ": the scene was counted, not built: about " + short_text(std::round(crowd.pairs)) + " pairs of bodies overlap at the start, each with about " +
          short_text(std::round(crowd.others)) + " others, and solving their contacts takes longer than a check; move them apart";
+}
+
+std::string unfinished(const Scene& scene, double seconds) {
+  return scene.source.string() + ": the scene was counted, but building it and solving its first contacts takes more than the limit of " + short_text(seconds) +
+         " s of processor time of a check; --time-limit raises the limit";
 }
 
 /// What is looked at here does not depend on how exact contacts are, which may take long where they are deep.
@@ -45,7 +52,7 @@ void build_and_look(Scene scene, const SimulationOptions& options, CheckReport& 
 
 }  // namespace
 
-CheckReport check_scene(const Scene& scene, SimulationOptions options, double build) {
+CheckReport check_scene(const Scene& scene, SimulationOptions options, double build, double seconds) {
   CheckReport report;
   report.objects = scene.objects.size();
   report.frames = scene.frame_count();
@@ -64,10 +71,17 @@ CheckReport check_scene(const Scene& scene, SimulationOptions options, double bu
     report.warnings.push_back(not_solved(*crowd));
     return report;
   }
+  const ProcessorLimit limit(seconds, options.interrupt);
   options.questions = true;
   options.memory = build;
+  options.interrupt = limit.interrupt();
   try {
+    const InterruptScope scope(limit.interrupt());
     build_and_look(scene, options, report);
+  } catch (const Interrupted&) {
+    if (!limit.passed()) throw;
+    report.warnings.push_back(unfinished(scene, seconds));
+    report.built = false;
   } catch (const OverBudget& over) {  // by counts that only the model has
     expect_within(scene, over.counts(), allowed);
     report.warnings = {not_built(over.counts(), build)};

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "file/fields_particles.h"
+#include "file/named_files.h"
+#include "file/scene_places.h"
 #include "model/arrangement.h"
 #include "model/model_laws.h"
 #include "output/frame_looks.h"
@@ -47,7 +49,7 @@ class SceneCounter {
 
   void add_file(const std::string& file, const std::string& key) {
     std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(scene_.source.parent_path() / file, error);
+    const std::uintmax_t size = std::filesystem::file_size(readable_file(files_of(scene_), file), error);  // others are reported where they are read
     if (!error) add(Counted::FileBytes, key, static_cast<double>(size));
   }
   void count_files() {
@@ -63,9 +65,8 @@ class SceneCounter {
   }
   void add_texture(const std::optional<TextureDesc>& texture, const std::string& key) {
     if (!texture || texture->pattern != PatternName::Picture) return;
-    const std::filesystem::path path = scene_.source.parent_path() / texture->file;
-    std::error_code absent;
-    if (!std::filesystem::is_regular_file(path, absent)) return;  // other kinds, such as pipes, are reported when they are read
+    const std::filesystem::path path = readable_file(files_of(scene_), texture->file);
+    if (path.empty()) return;
     const auto [width, height] = picture_size(path);
     add(Counted::TexturePixels, key, static_cast<double>(width) * static_cast<double>(height));
   }

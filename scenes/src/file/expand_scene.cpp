@@ -43,8 +43,8 @@ Node* without(Node& mapping, std::span<const std::string_view> keys, Tree& tree)
 /// Merges included files; every file is read once for each `include` that names it.
 class Includes {
  public:
-  Includes(const std::filesystem::path& folder, SourceTexts& texts, Tree& tree, FaultList& faults)
-      : folder_(folder.empty() ? "." : folder), texts_(texts), tree_(tree), faults_(faults) {}
+  Includes(const FileAccess& files, SourceTexts& texts, Tree& tree, FaultList& faults)
+      : files_(files), texts_(texts), tree_(tree), faults_(faults) {}
 
   Node* merge(Node* root, const std::filesystem::path& folder) {
     const Node::Entry* entry = root->find("include");
@@ -72,19 +72,18 @@ class Includes {
       return nullptr;
     };
     if (name.kind != Node::Kind::Scalar || name.text.empty()) return fail("expected the name of a file", name.described(), "");
-    std::error_code unknown;
     const std::filesystem::path path = folder / name.text;
+    std::error_code unknown;
     const std::filesystem::path real = std::filesystem::weakly_canonical(std::filesystem::absolute(path, unknown), unknown);
-    const std::filesystem::path top = std::filesystem::weakly_canonical(std::filesystem::absolute(folder_, unknown), unknown);
-    const auto [end, rest] = std::mismatch(top.begin(), top.end(), real.begin(), real.end());
-    if (unknown || end != top.end()) return fail("expected a file inside the scene's folder", '\'' + shown(name.text) + '\'', "");
     if (std::find(open_.begin(), open_.end(), real) != open_.end()) return fail("expected files that do not include one another in a circle", '\'' + shown(name.text) + '\'', "");
-    if (++files_ > kMostIncludes) return fail("expected at most " + std::to_string(kMostIncludes) + " included files", "more", "");
+    if (++count_ > kMostIncludes) return fail("expected at most " + std::to_string(kMostIncludes) + " included files", "more", "");
     std::optional<std::string> text;
     try {
-      text = read_text(named_file(folder, name.text));
+      expect_readable(files_, path);
+      text = read_text(path);
     } catch (const Error& error) {
-      return fail(error.faults().front().expected, error.faults().front().found, "");
+      const Fault& fault = error.faults().front();
+      return fail(fault.expected, fault.found, fault.hint);
     }
     if (!text) return fail("expected a readable scene file", std::filesystem::exists(real, unknown) ? "a file that cannot be read" : "nothing", "");
     const std::uint32_t source = texts_.add(path.string(), std::move(*text), false);
@@ -97,12 +96,12 @@ class Includes {
     return whole;
   }
 
-  std::filesystem::path folder_;
+  const FileAccess& files_;
   SourceTexts& texts_;
   Tree& tree_;
   FaultList& faults_;
   std::vector<std::filesystem::path> open_;
-  std::size_t files_ = 0;
+  std::size_t count_ = 0;
 };
 
 }  // namespace
@@ -130,8 +129,8 @@ Node* merged(Node& base, Node& over, Tree& tree) {
   return &over;
 }
 
-Node* with_includes(Node* root, const std::filesystem::path& folder, SourceTexts& texts, Tree& tree, FaultList& faults) {
-  Node* out = Includes(folder, texts, tree, faults).merge(root, folder);
+Node* with_includes(Node* root, const FileAccess& files, SourceTexts& texts, Tree& tree, FaultList& faults) {
+  Node* out = Includes(files, texts, tree, faults).merge(root, files.folder);
   if (out->count > kMostNodes) faults.add(root->mark, "include", "expected at most " + std::to_string(kMostNodes) + " nodes in all files", "more", "");
   return out;
 }

@@ -2,13 +2,13 @@
 /// What a scene file says in short, written out before its keys are read: `include`, `variables`, `defaults`, `repeat` and ${expressions}.
 #pragma once
 
-#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "file/expression.h"
+#include "file/named_files.h"
 #include "file/yaml_tree.h"
 
 namespace supple::scenes {
@@ -16,9 +16,9 @@ namespace supple::scenes {
 inline constexpr std::size_t kMostIncludes = 64;  ///< files of one scene
 
 /// The tree with the files that `include` names merged into it, which may include others: what a file says itself wins over what it
-/// includes; lists of mappings are joined, included items first. Paths are relative to the file that names them and stay within `folder`.
+/// includes; lists of mappings are joined, included items first. Paths are relative to the file that names them.
 /// Nodes keep the places in their own files. @param root  a mapping
-[[nodiscard]] Node* with_includes(Node* root, const std::filesystem::path& folder, SourceTexts& texts, Tree& tree, FaultList& faults);
+[[nodiscard]] Node* with_includes(Node* root, const FileAccess& files, SourceTexts& texts, Tree& tree, FaultList& faults);
 
 /// Variables of a scene, and the expansion of nodes by them.
 class Expansion {

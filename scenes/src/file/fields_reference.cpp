@@ -38,7 +38,8 @@ objects:
   Within `[ ]` and `{ }` YAML needs quotes around it. `$${` stands for `${`. Nothing is executed.
 - **Variables** are numbers, quantities or texts, may use one another, and are set by `--set variables.r=3cm`.
 - **Defaults** are merged into each item of a list of the scene (`objects`, `obstacles`, ...) where it does not have the key.
-- **Includes** are files in the scene's folder. Mappings are merged, lists of mappings joined; the scene's own keys win, and so does a later file
+- **Files** that a scene names are, after links are resolved, in its own folder or below it. Others need `--allow-path`.
+- **Includes** are such files. Mappings are merged, lists of mappings joined; the scene's own keys win, and so does a later file
   over an earlier one. Files that an included file names are relative to the scene.
 
 )";

@@ -162,8 +162,9 @@ void read_accuracy(const Node& root, Scene& scene) {
 int Scene::frame_count() const { return 1 + static_cast<int>(std::floor(duration * frame_rate + 1e-9)); }
 
 Scene parse_scene(const std::string& text, const std::string& name, const std::filesystem::path& folder,
-                  std::span<const std::string> overrides) {
+                  std::span<const std::string> overrides, std::span<const std::filesystem::path> allowed) {
   const auto places = std::make_shared<ScenePlaces>();
+  places->files = {folder, {allowed.begin(), allowed.end()}};
   SourceTexts& texts = places->texts;
   Tree& tree = places->tree;
   FaultList faults(texts);
@@ -176,7 +177,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   const bool mapping = root->kind == Node::Kind::Mapping;
   if (mapping) {
     const std::size_t before = faults.count();
-    root = with_includes(root, folder, texts, tree, faults);
+    root = with_includes(root, places->files, texts, tree, faults);
     if (faults.count() > before) faults.raise();  // keys of files that are not there would be missed, too
   }
   std::vector<Setting> settings;
@@ -200,7 +201,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
     faults.add(root->mark, "", "expected a scene", root->described(), "a scene is a mapping that begins with 'schema: 1'");
   } else {
     read_accuracy(*root, scene);
-    ReadArchive archive(faults, *root, "");
+    ReadArchive archive(faults, *root, "", places->files);
     scene_members(archive, scene);
     archive.finish();
   }
@@ -211,18 +212,19 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   std::sort(scene.obstacles.begin(), scene.obstacles.end(), by_name);
   scene.source = folder / name;
   places->root = root;
-  places->source = {text, name, folder, {overrides.begin(), overrides.end()}};
+  places->source = {text, name, folder, {overrides.begin(), overrides.end()}, {allowed.begin(), allowed.end()}};
   scene.places = places;
-  const SceneKeys motion = motion_keys(scene, folder);
+  FileHashes hashes(places->files);
+  const SceneKeys motion = motion_keys(scene, hashes);
   scene.motion_keys = std::make_shared<const std::string>(text_of(motion));
   scene.content_hash = hash_of(motion);
-  scene.picture_hash = hash_of(picture_keys(scene, folder));
+  scene.picture_hash = hash_of(picture_keys(scene, hashes));
   return scene;
 }
 
 const SceneSource* source_of(const Scene& scene) { return scene.places ? &scene.places->source : nullptr; }
 
-Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides) {
+Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides, std::span<const std::filesystem::path> allowed) {
   std::error_code status;
   const auto fail = [&](std::string found) {
     throw Error(ErrorKind::Io, Fault{.place = path.string(),
@@ -234,9 +236,10 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
   if (std::filesystem::is_directory(path, status)) fail("a folder");
   const std::string name = path.filename().string();  // outputs have this name, also in files that cannot hold any name
   if (std::any_of(name.begin(), name.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7F; })) fail("a name with control characters");
+  if (name.starts_with('.')) fail("a name that begins with a dot");  // "...yaml" would be the scene "..", whose folder is not its own
   const std::optional<std::string> text = read_text(path);
   if (!text) fail(std::filesystem::exists(path, status) ? "a file that cannot be read" : "nothing");
-  Scene scene = parse_scene(*text, path.string(), path.parent_path(), overrides);
+  Scene scene = parse_scene(*text, path.string(), path.parent_path(), overrides, allowed);
   scene.source = path;
   return scene;
 }

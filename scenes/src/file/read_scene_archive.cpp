@@ -24,13 +24,6 @@ bool has_controls(std::string_view text) {
   return std::any_of(text.begin(), text.end(), [](char c) { return (c >= 0 && c < 0x20 && c != '\n' && c != '\t') || c == 0x7F; });
 }
 
-/// Of names of files as scenes have them.
-bool is_inside(std::string_view text) {
-  const std::filesystem::path file(text);
-  const bool odd = has_controls(text) || text.find_first_of("\n\t") != std::string_view::npos;
-  return !text.empty() && !odd && file.is_relative() && std::find(file.begin(), file.end(), "..") == file.end();
-}
-
 /// Words of other tools and of the physics for keys that we name differently.
 std::string_view our_word(std::string_view key) {
   constexpr std::array<std::array<std::string_view, 2>, 9> kWords{{{"stiffness", "modulus"},
@@ -228,7 +221,7 @@ void ReadArchive::read_mapping(const Node& node, const std::string& path, const 
 
 void ReadArchive::read_members(const Node& node, const std::string& path, const MemberType& type, void* one) {
   if (node.kind != Node::Kind::Mapping) return refuse(node, path, type);
-  ReadArchive inner(faults_, node, path);
+  ReadArchive inner(faults_, node, path, files_);
   type.fields(inner, one);
   inner.finish();
 }
@@ -352,8 +345,8 @@ void ReadArchive::read(const Node& node, const std::string& path, bool& value, c
 void ReadArchive::read(const Node& node, const std::string& path, std::string& value, const Rule& rule) {
   if (node.kind != Node::Kind::Scalar) {
     fault(node, path, rule.name ? "expected a name" : "expected text", "");
-  } else if (rule.file && !is_inside(node.text)) {
-    fault(node, path, "expected a file inside the scene's folder", "");
+  } else if (rule.file && !may_name(files_, node.text)) {
+    fault(node, path, kInsideFolder, kAllowHint);
   } else if (has_controls(node.text)) {
     fault(node, path, "expected text without control characters", "");
   } else if (rule.name && !is_identifier(node.text)) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "file/fields_info.h"
+#include "file/named_files.h"
 #include "file/read_scene_faults.h"
 #include "file/yaml_tree.h"
 
@@ -16,8 +17,9 @@ namespace supple::scenes {
 class ReadArchive final : public FieldArchive {
  public:
   /// @param mapping  a Mapping node   @param path  its key path, "" for the whole scene
-  ReadArchive(FaultList& faults, const Node& mapping, std::string path)
-      : faults_(faults), mapping_(mapping), path_(std::move(path)) {}
+  /// @param files  outlives the archive
+  ReadArchive(FaultList& faults, const Node& mapping, std::string path, const FileAccess& files)
+      : faults_(faults), mapping_(mapping), path_(std::move(path)), files_(files) {}
 
   [[nodiscard]] bool given(std::string_view key) const override { return mapping_.find(key) != nullptr; }
   [[nodiscard]] bool sound(std::string_view key) const override;
@@ -86,6 +88,7 @@ class ReadArchive final : public FieldArchive {
   FaultList& faults_;
   const Node& mapping_;
   std::string path_;
+  const FileAccess& files_;
   std::vector<std::string_view> known_;
   std::vector<Idle> idle_;
   std::vector<Missing> missing_;

@@ -1,12 +1,8 @@
 #include "file/scene_keys.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <filesystem>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -21,8 +17,6 @@
 #include "file/read_scene_faults.h"
 #include "output/camera.h"
 #include "supple/core/hash.h"
-#include "supple/core/io/atomic_file.h"
-#include "supple/core/io/descriptor.h"
 
 namespace supple::scenes {
 namespace {
@@ -69,26 +63,6 @@ std::string degrees_text(double angle) {
     if (read * kDegree == angle) return {text.data(), end};
   }
   return number_text(degrees);
-}
-
-/// Hash of the content of a file, regardless of its name. A file that cannot be read or is too large is reported where it is used.
-std::string content_text(const std::filesystem::path& path) {
-  std::error_code status;
-  if (!std::filesystem::is_regular_file(path, status)) return "absent";
-  if (std::filesystem::file_size(path, status) > io::kLargestInput) return "too large";
-  const io::Descriptor file = io::open_file(path, O_RDONLY);
-  std::string part(std::size_t{1} << 20, '\0');  // bytes in memory at a time
-  Hasher hasher;
-  for (bool whole = false; !whole;) {
-    std::size_t used = 0;
-    while (!whole && used < part.size()) {
-      const ssize_t count = io::retried([&] { return ::read(file.get(), part.data() + used, part.size() - used); });
-      whole = count <= 0;
-      if (!whole) used += static_cast<std::size_t>(count);
-    }
-    hasher.add(std::string_view(part).substr(0, used));
-  }
-  return "content " + to_hex(hasher.value());
 }
 
 std::string value_text(double value, const Rule& rule) { return rule.degrees ? degrees_text(value) : number_text(value); }
@@ -169,7 +143,7 @@ class NameArchive final : public FieldArchive {
 /// Common data of the listing of all mappings.
 struct Listing {
   Taken taken;
-  std::filesystem::path folder;  ///< folder of the files
+  FileHashes& hashes;  ///< of files
   SceneKeys keys{};
   std::map<void (*)(FieldArchive&, void*), DefaultArchive> defaults{};  ///< of each type of mapping, by its members
 };
@@ -207,7 +181,7 @@ class KeyArchive final : public FieldArchive {
   void list(const Member& member, std::string_view key, const Rule& rule) {
     if (key == "file" && member.type->type == FieldType::Text) {
       const std::string& name = member.as<std::string>();
-      if (!name.empty()) add(path_of(key), content_text(listing_.folder / name), kNone);
+      if (!name.empty()) add(path_of(key), listing_.hashes.of(name), kNone);
       return;
     }
     const auto usual = std::find_if(defaults_.texts.begin(), defaults_.texts.end(), [&](const auto& text) { return text.first == key; });
@@ -321,8 +295,8 @@ void leave_out_pairs(const Touching& touching, Scene& scene) {
   }
 }
 
-SceneKeys keys_of(Scene scene, Taken taken, const std::filesystem::path& folder) {
-  Listing listing{taken, folder};
+SceneKeys keys_of(Scene scene, Taken taken, FileHashes& hashes) {
+  Listing listing{taken, hashes};
   Scene empty;
   DefaultArchive defaults;
   scene_members(defaults, empty);
@@ -361,17 +335,17 @@ std::string setting(const SceneKey* other, const SceneKey* here) {
 
 }  // namespace
 
-SceneKeys motion_keys(const Scene& scene, const std::filesystem::path& folder) {
+SceneKeys motion_keys(const Scene& scene, FileHashes& hashes) {
   Scene acting = scene;
   const Touching touching(scene);
   const bool meets_solids = leave_out_solids(touching, acting);
   leave_out_pairs(touching, acting);
   if (!meets_solids && !touching.among_objects()) acting.contact = {};
-  return keys_of(std::move(acting), moves, folder);
+  return keys_of(std::move(acting), moves, hashes);
 }
 
-SceneKeys picture_keys(const Scene& scene, const std::filesystem::path& folder) {
-  SceneKeys keys = keys_of(scene, shows, folder);
+SceneKeys picture_keys(const Scene& scene, FileHashes& hashes) {
+  SceneKeys keys = keys_of(scene, shows, hashes);
   const std::span<const CameraDesc> cameras = cameras_of(scene);
   if (std::any_of(cameras.begin(), cameras.end(), [](const CameraDesc& c) { return c.turntable != 0.0; })) {
     keys.push_back({"turntable over", number_text(scene.duration), ""});

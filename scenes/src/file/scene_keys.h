@@ -4,11 +4,11 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "file/named_files.h"
 #include "supple/scenes/scene.h"
 
 namespace supple::scenes {
@@ -27,10 +27,10 @@ inline constexpr std::string_view kNone = "none";
 
 /// The keys that act on the motion: neither looks and outputs, nor grounds, obstacles, pairs and rules of contact without effect by
 /// the rules of the scene. An obstacle counts if an object may touch it, even if none comes near.
-/// @param folder  where files that the scene names are
-[[nodiscard]] SceneKeys motion_keys(const Scene& scene, const std::filesystem::path& folder);
+/// @param hashes  of the files that the scene names
+[[nodiscard]] SceneKeys motion_keys(const Scene& scene, FileHashes& hashes);
 /// The keys that affect a picture of a given state.
-[[nodiscard]] SceneKeys picture_keys(const Scene& scene, const std::filesystem::path& folder);
+[[nodiscard]] SceneKeys picture_keys(const Scene& scene, FileHashes& hashes);
 
 [[nodiscard]] std::uint64_t hash_of(const SceneKeys& keys);
 /// One line a key, for files.

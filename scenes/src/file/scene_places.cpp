@@ -1,7 +1,6 @@
 #include "file/scene_places.h"
 
 #include <span>
-#include <system_error>
 
 #include "supple/core/io/atomic_file.h"
 
@@ -10,20 +9,6 @@ namespace supple::scenes {
 std::string place_of(const Scene& scene, std::string_view key) {
   if (scene.places == nullptr) return scene.source.string();
   return scene.places->texts.place(mark_of(*scene.places->root, key));
-}
-
-std::filesystem::path named_file(const std::filesystem::path& folder, const std::string& name) {
-  std::filesystem::path path = folder / name;
-  std::error_code unknown;
-  const std::filesystem::file_status status = std::filesystem::status(path, unknown);
-  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) return path;  // an absent file is reported by its reader
-  throw Error(ErrorKind::Io, Fault{.place = path.string(),
-                                   .key = {},
-                                   .expected = "expected a regular file",
-                                   .found = std::filesystem::is_directory(status) ? "a folder"
-                                            : std::filesystem::is_fifo(status)    ? "a pipe"
-                                                                                  : "a device or a socket",
-                                   .hint = {}});
 }
 
 std::optional<std::string> read_text(const std::filesystem::path& path) {

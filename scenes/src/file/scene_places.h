@@ -1,5 +1,5 @@
 /// @file scene_places.h
-/// Positions of the keys of a scene in its file, for faults that only the whole scene shows.
+/// What reading a scene leaves besides its keys: their positions in its file, for faults that only the whole scene shows, and from where it may read files.
 #pragma once
 
 #include <filesystem>
@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "file/named_files.h"
 #include "file/yaml_tree.h"
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
@@ -21,7 +22,13 @@ struct ScenePlaces {
   Tree tree;
   const Node* root = nullptr;
   SceneSource source;
+  FileAccess files;
 };
+
+/// Of a scene that was not read: the folder of its source.
+[[nodiscard]] inline FileAccess files_of(const Scene& scene) {
+  return scene.places == nullptr ? FileAccess{scene.source.parent_path(), {}} : scene.places->files;
+}
 
 /// "file:line:column" of a key, or of the nearest one above it that is given; the file alone of a scene that was not read.
 /// @param key  as in messages and overrides: "objects.ball.skeleton[0].radius"
@@ -38,10 +45,6 @@ auto read_for(const std::string& key, Read&& read) try {
   }
   throw Error(error.kind(), std::move(faults));
 }
-
-/// Path of a file that a scene in this folder names. @throws Error{Io} where that is a pipe, a device or a folder: reading it may
-/// never end
-[[nodiscard]] std::filesystem::path named_file(const std::filesystem::path& folder, const std::string& name);
 
 /// The text of a scene file, at most one byte more than `parse_yaml` takes, so that it refuses larger ones; none where it cannot be read.
 [[nodiscard]] std::optional<std::string> read_text(const std::filesystem::path& path);

@@ -120,6 +120,10 @@ class Builder : public YAML::EventHandler {
         open.keep = false;
       }
       count(open.key_mark, 1);
+      if (anchor != 0) {  // an alias to a key is its text
+        Node* node = anchors_[anchor] = tree_.make(Node::Kind::Scalar, open.key_mark);
+        node->text = value;
+      }
       return;
     }
     Node* node = leaf(Node::Kind::Scalar, at(mark), anchor);

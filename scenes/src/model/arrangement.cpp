@@ -35,7 +35,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std:
       break;
     case ArrangeKind::Geodesic: out = core::arrange_geodesic(d.frequency, d.radius); break;
     case ArrangeKind::File:
-      out.position = faults.read(key + ".file", [&] { return io::read_points_csv(named_file(scene.source.parent_path(), d.file), static_cast<std::size_t>(kMostCount)); }).value_or(std::vector<Vec3>());
+      out.position = faults.read(key + ".file", [&] { return io::read_points_csv(named_file(files_of(scene), d.file), static_cast<std::size_t>(kMostCount)); }).value_or(std::vector<Vec3>());
       out.orientation.assign(out.position.size(), Quat::Identity());
       break;
   }

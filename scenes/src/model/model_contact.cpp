@@ -96,7 +96,7 @@ double stick_frequency(const ObjectModel& object, const core::ParticleSet& parti
 /// Heights at the points of a regular grid, in any order.
 implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, const std::string& key, ModelFaults& faults) {
   const implicit::HeightField none{Vec3::Zero(), 1.0, 2, 2, std::vector<double>(4, 0.0), 1.0};
-  auto read = faults.read(key + ".file", [&] { return io::read_points_csv(named_file(scene.source.parent_path(), d.file)); });
+  auto read = faults.read(key + ".file", [&] { return io::read_points_csv(named_file(files_of(scene), d.file)); });
   if (!read) return none;
   std::vector<Vec3>& points = *read;
   std::sort(points.begin(), points.end(), [](const Vec3& a, const Vec3& b) {
@@ -125,7 +125,7 @@ implicit::HeightField height_field(const Scene& scene, const ObstacleDesc& d, co
 
 /// A mesh from a file, moved to its place; refused ones leave a fault and `body` as it is.
 void add_mesh(const Scene& scene, const ObstacleDesc& d, ModelFaults& faults, FixedBody& body) try {
-  auto read = faults.read("obstacles." + d.name + ".file", [&] { return io::read_mesh(named_file(scene.source.parent_path(), d.file)); });
+  auto read = faults.read("obstacles." + d.name + ".file", [&] { return io::read_mesh(named_file(files_of(scene), d.file)); });
   if (!read) return;
   const Quat turn = core::rotation_exp(d.turn * d.turn_axis.normalized());
   body.solid = implicit::MeshSolid(*read, {.slope = d.slope, .pose = {d.at, turn}});

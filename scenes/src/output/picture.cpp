@@ -76,7 +76,7 @@ render::RenderSettings settings_of(const Scene& scene, render::ContextKind conte
 }
 
 /// Reads the picture of a texture that has one. @throws Error{Io}
-render::Paint paint_of(const std::optional<TextureDesc>& texture, const std::filesystem::path& folder) {
+render::Paint paint_of(const std::optional<TextureDesc>& texture, const FileAccess& files) {
   render::Paint paint;
   if (!texture) return paint;
   constexpr std::array kKinds = {render::PaintKind::Checker, render::PaintKind::Stripes, render::PaintKind::Picture};
@@ -84,7 +84,7 @@ render::Paint paint_of(const std::optional<TextureDesc>& texture, const std::fil
   paint.colour = texture->colour;
   paint.size = texture->size;
   paint.axis = texture->axis;
-  if (texture->pattern == PatternName::Picture) paint.picture = std::make_shared<const render::Image>(render::read_png(named_file(folder, texture->file)));
+  if (texture->pattern == PatternName::Picture) paint.picture = std::make_shared<const render::Image>(render::read_png(named_file(files, texture->file)));
   return paint;
 }
 
@@ -92,7 +92,7 @@ render::View view_of(const Scene& scene) {
   render::View view;
   view.light = {.direction = scene.light.direction, .intensity = scene.light.intensity};
   if (scene.ground && scene.ground->visible) {
-    view.ground = render::Ground{scene.ground->height, scene.ground->colour, paint_of(scene.ground->texture, scene.source.parent_path())};
+    view.ground = render::Ground{scene.ground->height, scene.ground->colour, paint_of(scene.ground->texture, files_of(scene))};
   }
   view.background_top = scene.background.top;
   view.background_bottom = scene.background.bottom;
@@ -120,8 +120,8 @@ Quantity quantity_of(ColourByName by) {
   return {"", ""};
 }
 
-render::Paint paint_of(const LookDesc& look, const std::filesystem::path& folder) {
-  render::Paint paint = paint_of(look.texture, folder);
+render::Paint paint_of(const LookDesc& look, const FileAccess& files) {
+  render::Paint paint = paint_of(look.texture, files);
   if (look.colour_by == ColourByName::Normals) paint.kind = render::PaintKind::Normals;
   const Quantity quantity = quantity_of(look.colour_by);
   if (*quantity.column != '\0') {
@@ -162,7 +162,7 @@ void check_pictures(const Scene& scene) {
   std::vector<Fault> faults;
   const auto check = [&](const std::optional<TextureDesc>& texture, const std::string& owner) {
     try {
-      read_for(owner + "texture.file", [&] { return paint_of(texture, scene.source.parent_path()); });
+      read_for(owner + "texture.file", [&] { return paint_of(texture, files_of(scene)); });
     } catch (const Error& error) {
       faults.insert(faults.end(), error.faults().begin(), error.faults().end());
     }
@@ -189,9 +189,8 @@ std::vector<Mesh> obstacle_meshes(const Scene& scene, const Model& model, double
 
 ScenePictures::ScenePictures(const Scene& scene, const Model& model, render::ContextKind context, int threads)
     : scene_(scene), view_(view_of(scene)), bars_(bars_of(scene)), settings_(settings_of(scene, context, threads)), cell_(model.cell) {
-  const std::filesystem::path folder = scene.source.parent_path();
-  for (const ObjectDesc& object : scene.objects) paints_.push_back(paint_of(object.look, folder));
-  for (const ObstacleDesc& obstacle : scene.obstacles) obstacle_paints_.push_back(paint_of(obstacle.texture, folder));
+  for (const ObjectDesc& object : scene.objects) paints_.push_back(paint_of(object.look, files_of(scene)));
+  for (const ObstacleDesc& obstacle : scene.obstacles) obstacle_paints_.push_back(paint_of(obstacle.texture, files_of(scene)));
   obstacles_ = obstacle_meshes(scene, model, 0.0);
   renderer_ = render::make_renderer(settings_);
 }

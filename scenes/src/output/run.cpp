@@ -382,7 +382,7 @@ void leave_failure(const fs::path& folder, const std::string& name, const Error&
 
 std::string scene_name(const Scene& scene) {
   const std::string stem = scene.source.stem().string();
-  return stem.empty() ? "scene" : stem;
+  return stem.empty() || stem.front() == '.' ? "scene" : stem;
 }
 
 std::set<int> parse_frames(const std::string& text) {

@@ -2,6 +2,8 @@
 #include "supple/scenes/state_bytes.h"
 
 #include <cstring>
+#include <optional>
+#include <span>
 
 #include "file/scene_keys.h"
 #include "output/program_identity.h"
@@ -108,6 +110,13 @@ Fault fault_of(const std::filesystem::path& path, std::string expected, std::str
                                                   "`supple run --resume` continues from the last good one before it"));
 }
 
+/// By its first bytes, so that a large file of another kind is not read.
+void expect_magic(const std::filesystem::path& path) {
+  std::uint64_t magic = 0;
+  const std::optional<std::size_t> size = io::read_start(path, std::as_writable_bytes(std::span(&magic, 1)));
+  if (size == sizeof magic && magic != kMagic) damaged(path, "another kind of file");
+}
+
 [[noreturn]] void refuse(const std::filesystem::path& path, std::string expected, std::string found, std::string hint) {
   throw Error(ErrorKind::Corrupt, fault_of(path, std::move(expected), std::move(found), std::move(hint)));
 }
@@ -198,6 +207,7 @@ void save_state(const std::filesystem::path& path, const State& state, const Sta
 }
 
 State load_state(const std::filesystem::path& path, const StateOrigin& origin, const StateWanted& wanted) {
+  expect_magic(path);
   return state_of_bytes(path.string(), io::read_file(path, kLargestFile), origin, wanted);
 }
 
@@ -213,8 +223,8 @@ State state_of_bytes(const std::string& place, std::span<const std::byte> bytes,
   std::uint64_t magic = 0, version = 0, scene = 0;
   std::string keys, program;
   in.read(magic);
+  if (magic != kMagic) damaged(path, "another kind of file");
   in.read(version);
-  if (magic != kMagic) refuse(path, "expected a saved state", "another kind of file", {});
   if (version != kVersion) {
     refuse(path, "expected a saved state of version " + std::to_string(kVersion),
            "version " + std::to_string(version) + ", of another version of supple", either("run the scene again", wanted.otherwise));

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "supple/core/printable.h"
+
 namespace {
 
 using namespace supple;
@@ -27,6 +29,10 @@ TEST(Faults, LeaveEmptyPartsOut) {
 TEST(Faults, ShowWhatATerminalWouldObeyByItsBytes) {
   const Fault fault{.place = "a\nb.csv:1", .key = {}, .expected = "expected text", .found = "'\x1b[2J \u00e9 \xff \xe2\x82'", .hint = "\x7f"};
   EXPECT_EQ(fault.message(), "a\\x0ab.csv:1: expected text, found '\\x1b[2J \u00e9 \\xff \\xe2\\x82'; \\x7f");
+}
+
+TEST(Faults, ShowControlsBeyondAsciiByTheirBytes) {
+  EXPECT_EQ(printable("a\u009b31m\u0085 \u00a0\u00e9"), "a\\xc2\\x9b31m\\xc2\\x85 \u00a0\u00e9");
 }
 
 TEST(Errors, HoldAllFaultsAndTheirKind) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -10,6 +11,7 @@
 #include "core/support.h"
 #include "model/point_tree.h"
 #include "supple/core/arrange.h"
+#include "supple/core/interrupt.h"
 #include "supple/scenes/check.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/read_scene.h"
@@ -141,6 +143,17 @@ TEST(Check, CountsBodiesThatBeginInOneAnotherByTheDozen) {
   EXPECT_EQ(crowd.warnings[0].rfind("objects.a.particles: the scene was counted, not built: about 4950 pairs of bodies overlap at the start, each with about 99 others", 0), 0U)
       << crowd.warnings[0];
   EXPECT_TRUE(check_scene(balls("0.099"), {}).built);  // as balls that touch
+}
+
+TEST(Check, IsBrokenOffAtItsLimitOfTimeAndByInterrupts) {
+  const Scene scene = scene_of("    particles: {arrange: line, count: 1000, spacing: 0.2}\n    skeleton: [{shape: point, kernel: {radius: 0.5}}]\n    contact: {}\n", "ground: {height: -0.2}\n");
+  EXPECT_TRUE(check_scene(scene, {}, kCheckMemory, 600.0).built);
+  const CheckReport late = check_scene(scene, {}, kCheckMemory, 1e-6);
+  EXPECT_FALSE(late.built);
+  ASSERT_EQ(late.warnings.size(), 1U);
+  EXPECT_NE(late.warnings[0].find("more than the limit of 1e-06 s of processor time of a check; --time-limit"), std::string::npos) << late.warnings[0];
+  const std::atomic<int> signalled{2};
+  EXPECT_THROW((void)check_scene(scene, {.interrupt = &signalled}, kCheckMemory, 600.0), Interrupted);
 }
 
 TEST(Bytes, AreReadAndShown) {

@@ -303,6 +303,10 @@ TEST_F(HostileText, AliasBomb) {
   expect_refused(text, "200000 nodes");
 }
 TEST_F(HostileText, Cycle) { expect_refused("objects: &a [*a]\n", "that contains it"); }
+TEST_F(HostileText, AliasToAKey) {
+  EXPECT_EQ(parse("&name title: *name\n" + object_with("")).title, "title");
+  expect_refused("schema: 1\nduration: 1\n&name objects:\n  - {name: a, contact: *name}\n", "found 'objects'");
+}
 TEST_F(HostileText, DeepNesting) {
   std::string block;
   for (int i = 0; i < 100; ++i) block += std::string(static_cast<std::size_t>(i), ' ') + "a:\n";

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "supple/core/interrupt.h"
+
 namespace supple::collision {
 namespace {
 
@@ -63,6 +65,7 @@ bool MarchRuleSolver::upright(const Feet& feet, std::size_t i) const {
 /// Pressures at some feet, at their heights so far, and the tangents of the image there.
 void MarchRuleSolver::measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet,
                               std::span<const std::size_t> which) {
+  heed_scope();  // a pair may take seconds
   for (const std::size_t i : which) feet.batch.point[i] = plane(feet.triangle[i], feet.at[i]) + feet.height[i] * along(feet.triangle[i], feet.at[i]);
   pressure.evaluate(feet.batch, which, some_);
   for (const std::size_t i : which) find_tangents(feet, i);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "supple/core/interrupt.h"
 #include "surface/march/flat_cells.h"
 #include "surface/quadrature.h"
 #include "surface/region/squeezed_region.h"
@@ -374,6 +375,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
   for (int step = 0; step < kNewtonSteps && !open_.empty(); ++step) {
+    heed_scope();
     place_.clear();
     for (const std::size_t i : open_) place_.push_back(nodes_[i].point + columns_[i].at * columns_[i].way);
     value_.resize(open_.size());
@@ -413,7 +415,10 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
 /// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press. @return whether there were not too many cells
 bool MarchRuleSolver::lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
                                const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat) {
-  const auto mesh = [&] { return mesher_.mesh(pressure, overlap, cell_, axis, flat, mesh_) && mesh_.triangle.size() <= kMostPieces / 2; };
+  const auto mesh = [&] {
+    heed_scope();
+    return mesher_.mesh(pressure, overlap, cell_, axis, flat, mesh_) && mesh_.triangle.size() <= kMostPieces / 2;
+  };
   // Halves of the features until something is seen to press, as how long the box of an overlap is depends on how it lies.
   const double size = pressure.feature_size();
   cell_ = size;

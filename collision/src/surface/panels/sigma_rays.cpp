@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "supple/core/interrupt.h"
+
 namespace supple::collision {
 namespace {
 
@@ -62,6 +64,7 @@ bool advance(SigmaRay& ray, double enough, double reach) {
 }  // namespace
 
 void probe(SigmaView& view, std::span<SigmaRay> rays, std::span<const std::uint32_t> which, RayScratch& scratch) {
+  heed_scope();  // a pair may take seconds
   PressureBatch& batch = scratch.batch;
   batch.resize(which.size());
   for (std::size_t i = 0; i < which.size(); ++i) batch.point[i] = view.frame.world(rays[which[i]].local(rays[which[i]].height));

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "supple/core/interrupt.h"
+
 namespace supple::collision {
 namespace {
 
@@ -108,6 +110,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
     rim_batch_.point[k] = origin + rays.radius[k] * e + rays.height[k] * axis;
   };
   for (int iteration = 0; iteration < kRimSteps && !open_.empty(); ++iteration) {
+    heed_scope();
     if (again) {
       for (std::size_t k = 0; k < n; ++k) place(k);
       pressure.evaluate(rim_batch_);

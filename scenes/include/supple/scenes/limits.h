@@ -1,5 +1,5 @@
 /// @file supple/scenes/limits.h
-/// Memory that a scene needs, estimated by counts before anything is allocated, and its limits.
+/// Memory that a scene needs, estimated by counts before anything is allocated, and the limits of memory and time.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ namespace supple::scenes {
 
 /// Default limit of memory for a scene [byte].
 inline constexpr double kDefaultMemory = 8e9;
-/// Default limit of memory for what `check_scene` builds: about a second of work [byte].
-inline constexpr double kCheckMemory = 2e8;
+/// Default limits of memory [byte] and of processor time [s] for what `check_scene` builds, so that it answers in a second and 256 MB.
+inline constexpr double kCheckMemory = 2e8, kCheckSeconds = 0.7;
 
 /// Items of which a scene may have very many.
 enum class Counted : std::uint8_t { Particles, Primitives, Bonds, FrictionBonds, NeighbourPairs, Laws, Bodies, Samples, FileBytes, TexturePixels, ImageSamples };
