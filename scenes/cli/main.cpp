@@ -30,8 +30,10 @@
 #include "supple/core/interrupt.h"
 #include "supple/core/io/descriptor.h"
 #include "supple/scenes/check.h"
+#include "supple/scenes/estimate.h"
 #include "supple/scenes/inspect.h"
 #include "supple/scenes/limits.h"
+#include "supple/scenes/preview.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
@@ -98,6 +100,8 @@ struct Arguments {
   bool resume = false;
   bool simulate_only = false;
   bool render_only = false;
+  bool dry_run = false;
+  bool preview = false;
   bool profile = false;
   bool quiet = false;
   bool samples = false;
@@ -173,9 +177,12 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   return options;
 }
 
-fs::path folder_of(const scenes::Scene& scene, const Arguments& arguments) {
-  return arguments.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(arguments.out);
+/// Previews have folders of their own, so that they replace no run.
+fs::path folder_of(const std::string& name, const Arguments& arguments) {
+  if (!arguments.out.empty()) return arguments.out;
+  return fs::path("out") / (arguments.preview ? name + "_preview" : name);
 }
+fs::path folder_of(const scenes::Scene& scene, const Arguments& arguments) { return folder_of(scenes::scene_name(scene), arguments); }
 
 tool::ProgressBar make_bar(const Arguments& arguments) {
   return tool::ProgressBar(arguments.quiet ? tool::ProgressStyle::None : tool::progress_style(arguments.progress));
@@ -183,10 +190,15 @@ tool::ProgressBar make_bar(const Arguments& arguments) {
 
 scenes::Scene read_for_run(const Arguments& arguments) {
   try {
-    return scenes::read_scene(arguments.scene, arguments.set);
+    scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set);
+    if (!arguments.preview) return scene;
+    std::vector<std::string> set = scenes::preview_overrides(scene);
+    set.insert(set.begin(), arguments.set.begin(), arguments.set.end());
+    return scenes::read_scene(arguments.scene, set);
   } catch (const Error& error) {
+    if (arguments.dry_run) throw;  // it leaves no files
     const std::string name = fs::path(arguments.scene).stem().string();
-    scenes::leave_failure(arguments.out.empty() ? fs::path("out") / name : fs::path(arguments.out), name, error);
+    scenes::leave_failure(folder_of(name, arguments), name, error);
     throw;
   }
 }
@@ -194,6 +206,10 @@ scenes::Scene read_for_run(const Arguments& arguments) {
 int run(const Arguments& arguments) {
   const scenes::Scene scene = read_for_run(arguments);
   tool::ProgressBar bar = make_bar(arguments);
+  if (arguments.dry_run) {
+    std::cout << scenes::text_of(scenes::estimate_run(scene, run_options(arguments, {}, bar)));
+    return 0;
+  }
   const scenes::RunResult result = scenes::run_scene(scene, run_options(arguments, folder_of(scene, arguments), bar));
   bar.finish();
   return report(result, arguments);
@@ -359,6 +375,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_verb->add_option("--time-limit", a.time_limit, "stop after this many seconds, between two steps; --resume continues from the last saved state")
       ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
   run_verb->add_flag("--render-only", a.render_only, "draw pictures and film from the saved states of an earlier run, as `supple render` does");
+  run_verb->add_flag("--dry-run", a.dry_run, "print particles, steps, triangles, memory, disk and time that the run would take, from a sample of its frames; writes nothing")
+      ->excludes("--render-only")->excludes("--resume")->excludes("--overwrite");
+  run_verb->add_flag("--preview", a.preview, "a quick film: pictures of a quarter of the size, coarse meshes and contact; the folder is out/NAME_preview")
+      ->excludes("--render-only");
   run_verb->footer(std::string(kFilmRule) +
                    "With --frames a run ends after the last of them; result.json holds its last frame, and --resume continues from there.\n\n"
                    "Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");

@@ -117,6 +117,7 @@ void Simulation::Impl::step() {
 
 void Simulation::Impl::make_step() {
   drop_results();
+  release_pins();
   if (state.substep == 0) {
     last_frame = state;
     state.halvings = std::max(0, first_halvings(scene, model, integrator, laws, state) + options.finer);
