@@ -34,9 +34,11 @@
 #include "supple/core/interrupt.h"
 #include "supple/core/io/descriptor.h"
 #include "supple/scenes/check.h"
+#include "supple/scenes/estimate.h"
 #include "supple/scenes/gltf.h"
 #include "supple/scenes/inspect.h"
 #include "supple/scenes/limits.h"
+#include "supple/scenes/preview.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
@@ -109,6 +111,8 @@ struct Arguments {
   bool resume = false;
   bool simulate_only = false;
   bool render_only = false;
+  bool dry_run = false;
+  bool preview = false;
   bool profile = false;
   bool quiet = false;
   bool samples = false;
@@ -186,9 +190,12 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   return options;
 }
 
-fs::path folder_of(const scenes::Scene& scene, const Arguments& arguments) {
-  return arguments.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(arguments.out);
+/// Previews have folders of their own, so that they replace no run.
+fs::path folder_of(const std::string& name, const Arguments& arguments) {
+  if (!arguments.out.empty()) return arguments.out;
+  return fs::path("out") / (arguments.preview ? name + "_preview" : name);
 }
+fs::path folder_of(const scenes::Scene& scene, const Arguments& arguments) { return folder_of(scenes::scene_name(scene), arguments); }
 
 tool::ProgressBar make_bar(const Arguments& arguments) {
   return tool::ProgressBar(arguments.quiet ? tool::ProgressStyle::None : tool::progress_style(arguments.progress));
@@ -196,10 +203,15 @@ tool::ProgressBar make_bar(const Arguments& arguments) {
 
 scenes::Scene read_for_run(const Arguments& arguments) {
   try {
-    return scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
+    scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
+    if (!arguments.preview) return scene;
+    std::vector<std::string> set = scenes::preview_overrides(scene);
+    set.insert(set.begin(), arguments.set.begin(), arguments.set.end());
+    return scenes::read_scene(arguments.scene, set, arguments.allowed);
   } catch (const Error& error) {
+    if (arguments.dry_run) throw;  // it leaves no files
     const std::string name = fs::path(arguments.scene).stem().string();
-    scenes::leave_failure(arguments.out.empty() ? fs::path("out") / name : fs::path(arguments.out), name, error);
+    scenes::leave_failure(folder_of(name, arguments), name, error);
     throw;
   }
 }
@@ -207,6 +219,10 @@ scenes::Scene read_for_run(const Arguments& arguments) {
 int run(const Arguments& arguments) {
   const scenes::Scene scene = read_for_run(arguments);
   tool::ProgressBar bar = make_bar(arguments);
+  if (arguments.dry_run) {
+    std::cout << scenes::text_of(scenes::estimate_run(scene, run_options(arguments, {}, bar)));
+    return 0;
+  }
   scenes::RunOptions options = run_options(arguments, folder_of(scene, arguments), bar);
   std::optional<tool::ViewServer> server;
   if (arguments.view) {
@@ -405,6 +421,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_verb->add_flag("--view", a.view, "serve a page to this machine that follows the run (`supple view`)");
   run_verb->add_option("--port", a.port, "with --view: port of the page (default: any that is free)")->check(CLI::Range(0, 65535));
   run_verb->add_flag("--render-only", a.render_only, "draw pictures and film from the saved states of an earlier run, as `supple render` does");
+  run_verb->add_flag("--dry-run", a.dry_run, "print particles, steps, triangles, memory, disk and time that the run would take, from a sample of its frames; writes nothing")
+      ->excludes("--render-only")->excludes("--resume")->excludes("--overwrite");
+  run_verb->add_flag("--preview", a.preview, "a quick film: pictures of a quarter of the size, coarse meshes and contact; the folder is out/NAME_preview")
+      ->excludes("--render-only");
   run_verb->footer(std::string(kFilmRule) +
                    "With --frames a run ends after the last of them; result.json holds its last frame, and --resume continues from there.\n\n"
                    "Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");

@@ -14,6 +14,7 @@
 
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/core/io/particle_files.h"
 
 namespace supple::io {
 namespace {
@@ -241,12 +242,19 @@ class PlyNumbers {
   const std::string& path_;
 };
 
-Mesh read_ply(std::string_view text, const std::string& path) {
+struct PlyHeader {
+  PlyFormat format = PlyFormat::Text;
+  std::vector<PlyElement> elements;
+  std::string_view content;  ///< after the header
+};
+
+PlyHeader read_ply_header(std::string_view text, const std::string& path) {
   Lines lines(text);
   std::string_view line;
-  PlyFormat format = PlyFormat::Text;
+  PlyHeader header;
+  PlyFormat& format = header.format;
+  std::vector<PlyElement>& elements = header.elements;
   bool ended = false, first = true;
-  std::vector<PlyElement> elements;
   while (!ended && lines.next(line)) {
     const std::string place = path + ':' + std::to_string(lines.number());
     const std::string whole(line.substr(0, 60));
@@ -282,9 +290,14 @@ Mesh read_ply(std::string_view text, const std::string& path) {
     }
   }
   if (!ended) refuse(path, "expected 'end_header'", "the end of the file");
+  header.content = lines.rest();
+  return header;
+}
 
+Mesh read_ply(std::string_view text, const std::string& path) {
+  const auto [format, elements, content] = read_ply_header(text, path);
   Mesh mesh;
-  PlyNumbers numbers(lines.rest(), format, path);
+  PlyNumbers numbers(content, format, path);
   std::vector<std::uint32_t> corner;
   for (const PlyElement& element : elements) {
     for (std::size_t k = 0; k < element.count; ++k) {
@@ -319,6 +332,35 @@ Mesh read_ply(std::string_view text, const std::string& path) {
 }
 
 }  // namespace
+
+NumberTable read_ply_vertices(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_file(path, kLargestInput);
+  const std::string place = path.string();
+  const PlyHeader header = read_ply_header({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, place);
+  NumberTable table;
+  PlyNumbers numbers(header.content, header.format, place);
+  for (const PlyElement& element : header.elements) {
+    const bool vertices = element.name == "vertex";
+    for (std::size_t k = 0; vertices && k < element.properties.size(); ++k) {
+      if (!element.properties[k].count) table.name.push_back(element.properties[k].name);
+    }
+    if (vertices) table.column.resize(table.name.size());
+    for (std::size_t row = 0; row < element.count; ++row) {
+      std::size_t column = 0;
+      for (const PlyProperty& property : element.properties) {
+        const double length = property.count ? numbers.next(*property.count) : 1.0;
+        for (std::uint64_t i = 0; static_cast<double>(i) < length; ++i) {
+          const double value = numbers.next(property.type);
+          if (!vertices || property.count) continue;
+          if (!std::isfinite(value)) refuse(place, "expected finite numbers", "another of vertex " + std::to_string(row));
+          table.column[column++].push_back(value);
+        }
+      }
+    }
+    if (vertices) break;
+  }
+  return table;
+}
 
 Mesh read_mesh(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();

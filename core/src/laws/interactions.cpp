@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <functional>
 #include <utility>
 
@@ -522,7 +523,24 @@ void PackedPairs::pad() {
   }
 }
 
-double ExternalLoad::factor(double time) const {
+double Course::at(double t) const {
+  SUPPLE_EXPECTS(!time.empty() && time.size() == factor.size());
+  if (t <= time.front()) return factor.front();
+  if (t >= time.back()) return factor.back();
+  const auto k = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), t) - time.begin());
+  const double share = (t - time[k - 1]) / (time[k] - time[k - 1]);
+  return factor[k - 1] + share * (factor[k] - factor[k - 1]);
+}
+
+double Course::largest() const {
+  double most = 0.0;
+  for (const double f : factor) most = std::max(most, std::abs(f));
+  return most;
+}
+
+double ExternalLoad::factor(double time) const { return course ? window(time) * course->at(time) : window(time); }
+
+double ExternalLoad::window(double time) const {
   if (time < begin || time >= end) return 0.0;
   if (ramp <= 0.0) return 1.0;
   return std::min(1.0, std::min((time - begin) / ramp, (end - time) / ramp));
@@ -531,12 +549,33 @@ double ExternalLoad::factor(double time) const {
 bool ExternalLoad::changes(double from, double to) const {
   const double since = from - 4.0 * std::numeric_limits<double>::epsilon() * std::abs(from);
   const double steady = end - begin > 2.0 * ramp ? ramp : 0.5 * (end - begin);
+  if (course && since <= course->time.back() && to >= course->time.front()) return true;
   return (since <= begin + steady && to >= begin) || (since <= end && to >= end - steady);
 }
 
+/// Between the knots of window and course their product is of second degree, for which Gauss' rule of two points is exact.
 double ExternalLoad::mean(double from, double to) const {
   SUPPLE_EXPECTS(from < to);
   if (!changes(from, to)) return factor(from);
+  if (!course) return mean_of_window(from, to);
+  std::vector<double> knots{from, to};
+  const auto add = [&](double t) {
+    if (t > from && t < to) knots.push_back(t);
+  };
+  const double rise = std::min(ramp, 0.5 * (end - begin));
+  for (const double t : {begin, begin + rise, end - rise, end}) add(t);
+  for (auto t = std::upper_bound(course->time.begin(), course->time.end(), from); t != course->time.end() && *t < to; ++t) add(*t);
+  std::sort(knots.begin(), knots.end());
+  constexpr double kGauss = 0.57735026918962576;  // 1/sqrt(3)
+  double sum = 0.0;
+  for (std::size_t k = 1; k < knots.size(); ++k) {
+    const double middle = 0.5 * (knots[k - 1] + knots[k]), half = 0.5 * (knots[k] - knots[k - 1]);
+    sum += half * (factor(middle - kGauss * half) + factor(middle + kGauss * half));
+  }
+  return sum / (to - from);
+}
+
+double ExternalLoad::mean_of_window(double from, double to) const {
   const double rise = ramp > 0.0 ? std::min(ramp, 0.5 * (end - begin)) : 0.0;
   const double height = ramp > 0.0 ? rise / ramp : 1.0;
   const auto impulse = [&](double t) {  // integral of the factor up to t

@@ -164,6 +164,7 @@ void place(Arrangement& arrangement, const Pose& pose) {
   for (std::size_t i = 0; i < arrangement.size(); ++i) {
     arrangement.position[i] = pose.to_world(arrangement.position[i]);
     arrangement.orientation[i] = (pose.orientation * arrangement.orientation[i]).normalized();
+    if (!arrangement.velocity.empty()) arrangement.velocity[i] = pose.orientation * arrangement.velocity[i];
   }
 }
 

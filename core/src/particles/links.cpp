@@ -197,7 +197,8 @@ LinkState unbroken(const Links& links) {
   return state;
 }
 
-LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger) {
+LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger,
+                        std::span<const std::uint32_t> cut) {
   const auto& [set, state, present] = linked;
   SUPPLE_EXPECTS(links_state.broken.size() == links.size() && dt >= 0.0);
   LinkChange change;
@@ -225,6 +226,12 @@ LinkChange update_links(const LinkedParticles& linked, const Links& links, doubl
     const PairPose pose = pair_pose(set, state, links.first[k], links.second[k]);
     if (exceeds(links.rules[links.rule[k]].breaking, links.rest_distance[k], pose, load[k])) breaking.push_back(k);
   }
+  for (const std::uint32_t k : cut) {
+    SUPPLE_EXPECTS(k < links.size());
+    if (links_state.broken[k] == 0) breaking.push_back(k);
+  }
+  std::sort(breaking.begin(), breaking.end());
+  breaking.erase(std::unique(breaking.begin(), breaking.end()), breaking.end());
   if (!breaking.empty() && !loads_decide) add_loads();  // for the books
   for (const std::size_t k : breaking) {
     links_state.broken[k] = 1;
@@ -304,7 +311,7 @@ std::vector<std::uint32_t> find_pieces(const ParticleSet& set, const Links& link
   };
   std::vector<std::uint32_t> breakable;  // objects
   for (std::size_t k = 0; k < links.size(); ++k) {
-    if (links.rules[links.rule[k]].breaking.ever()) breakable.push_back(set.object[links.first[k]]);
+    if (links.rules[links.rule[k]].breaking.ever() || links.rules[links.rule[k]].cut) breakable.push_back(set.object[links.first[k]]);
   }
   std::sort(breakable.begin(), breakable.end());
   for (std::uint32_t i = 1; i < set.size(); ++i) {

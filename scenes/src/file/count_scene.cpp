@@ -97,6 +97,10 @@ class SceneCounter {
       const Counted what = law.law == LawKind::Friction ? Counted::FrictionBonds : Counted::Bonds;
       add(what, law_key(i, k) + ".neighbours", static_cast<double>(core::count_bonds_along(number_[i], law.neighbours)));
     }
+    if (d.material && !d.separate && n > 1.0) {
+      constexpr double kBondsOfParticle = 18.0;  // of a block: nine pairs, each with a spring along it and a frame
+      add(Counted::Bonds, key + ".material", kBondsOfParticle * n);
+    }
     if (d.blend && d.blend->neighbours) {
       add(Counted::NeighbourPairs, key + ".blend.neighbours", static_cast<double>(core::count_bonds_along(number_[i], *d.blend->neighbours)));
     }

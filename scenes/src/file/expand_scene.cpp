@@ -6,6 +6,7 @@
 
 #include "file/fields_info.h"
 #include "file/scene_places.h"
+#include "file/shipped_includes.h"
 
 namespace supple::scenes {
 namespace {
@@ -72,6 +73,12 @@ class Includes {
       return nullptr;
     };
     if (name.kind != Node::Kind::Scalar || name.text.empty()) return fail("expected the name of a file", name.described(), "");
+    if (std::string_view(name.text).starts_with(kShippedPrefix)) {
+      const std::optional<std::string_view> shipped = shipped_include(name.text);
+      if (!shipped) return fail("expected '" + std::string(kShippedMaterials) + "'", '\'' + shown(name.text) + '\'', "");
+      const std::uint32_t source = texts_.add(name.text, std::string(*shipped), false);
+      return parse_yaml(texts_.text(source), source, tree_, faults_);
+    }
     const std::filesystem::path path = folder / name.text;
     std::error_code unknown;
     const std::filesystem::path real = std::filesystem::weakly_canonical(std::filesystem::absolute(path, unknown), unknown);
@@ -131,7 +138,11 @@ Node* merged(Node& base, Node& over, Tree& tree) {
 
 Node* with_includes(Node* root, const FileAccess& files, SourceTexts& texts, Tree& tree, FaultList& faults) {
   Node* out = Includes(files, texts, tree, faults).merge(root, files.folder);
-  if (out->count > kMostNodes) faults.add(root->mark, "include", "expected at most " + std::to_string(kMostNodes) + " nodes in all files", "more", "");
+  if (out->count > kMostNodes) {
+    std::string expected = "expected at most ";
+    expected.append(std::to_string(kMostNodes)).append(" nodes in all files");
+    faults.add(root->mark, "include", std::move(expected), "more", "");
+  }
   return out;
 }
 
@@ -325,7 +336,7 @@ Node* Expansion::expand_scene(Node& root) {
       fail(variable.node->mark, "variables." + shown(name), fault);
     }
   }
-  constexpr std::string_view kKeys[] = {"variables", "defaults"};
+  constexpr std::string_view kKeys[] = {"variables", "defaults", "materials"};
   Node* out = without(root, kKeys, tree_);
   const Node::Entry* defaults = root.find("defaults");
   if (defaults != nullptr && defaults->value->kind != Node::Kind::Null) {
@@ -354,7 +365,46 @@ Node* Expansion::expand_scene(Node& root) {
     measure(*out);
     nodes_ += out->count;
   }
-  return expand_mapping(*out, "");
+  return expand_mapping(*with_materials(root, *out), "");
+}
+
+/// The tree whose objects have the mappings of `materials` in place of their names.
+Node* Expansion::with_materials(const Node& root, Node& scene) {
+  const Node::Entry* materials = root.find("materials");
+  std::vector<std::string_view> names;
+  if (materials != nullptr && materials->value->kind == Node::Kind::Mapping) {
+    for (const Node::Entry& entry : materials->value->entries) names.push_back(entry.key);
+  } else if (materials != nullptr && materials->value->kind != Node::Kind::Null) {
+    fail(materials->value->mark, "materials", {"expected a mapping of names to materials", materials->value->described(), ""});
+    return &scene;
+  }
+  const Node::Entry* objects = scene.find("objects");
+  if (objects == nullptr || objects->value->kind != Node::Kind::List) return &scene;
+  Node* list = tree_.copy(*objects->value);
+  for (std::size_t i = 0; i < list->items.size(); ++i) {
+    const Node::Entry* material = list->items[i]->kind == Node::Kind::Mapping ? list->items[i]->find("material") : nullptr;
+    if (material == nullptr || material->value->kind != Node::Kind::Scalar || material->value->boolean() == false) continue;
+    const Node::Entry* known = names.empty() ? nullptr : materials->value->find(material->value->text);
+    if (known == nullptr) {
+      fail(material->value->mark, "objects[" + std::to_string(i) + "].material",
+           {"expected a mapping, or the name of one of 'materials'", '\'' + shown(material->value->text) + '\'',
+            names.empty() ? "add 'include: " + std::string(kShippedMaterials) + "' for jelly, rubber, foam, clay and steel" : known_hint(material->value->text, names)});
+      continue;
+    }
+    Node* item = tree_.copy(*list->items[i]);
+    for (Node::Entry& entry : item->entries) {
+      if (entry.key == "material") entry.value = known->value;
+    }
+    measure(*item);
+    list->items[i] = item;
+  }
+  measure(*list);
+  Node* out = tree_.copy(scene);
+  for (Node::Entry& entry : out->entries) {
+    if (entry.key == "objects") entry.value = list;
+  }
+  measure(*out);
+  return out;
 }
 
 }  // namespace supple::scenes

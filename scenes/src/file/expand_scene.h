@@ -26,8 +26,8 @@ class Expansion {
   /// @param root  with `variables`, if any; outlives this
   Expansion(const Node& root, Tree& tree, FaultList& faults);
 
-  /// The tree without `variables` and `defaults`: defaults are merged into the items of the lists that they name, items with `repeat` are
-  /// repeated, and expressions have become their values.
+  /// The tree without `variables`, `defaults` and `materials`: defaults are merged into the items of the lists that they name, names of
+  /// materials have become these, items with `repeat` are repeated, and expressions have become their values.
   [[nodiscard]] Node* expand_scene(Node& root);
   /// A node whose expressions have become their values; the same node where it has none. @param key  for messages
   [[nodiscard]] Node* expand(Node& node, const std::string& key);
@@ -47,6 +47,7 @@ class Expansion {
 
   [[nodiscard]] std::optional<Value> find(std::string_view name);
   [[nodiscard]] Value value_of(const Node& scalar);
+  [[nodiscard]] Node* with_materials(const Node& root, Node& scene);
   [[nodiscard]] Node* expand_list(Node& list, const std::string& key);
   [[nodiscard]] Node* expand_mapping(Node& mapping, const std::string& key);
   void expand_item(Node& item, const std::string& key, std::vector<Node*>& out);

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -71,6 +72,11 @@ void check_particles(Archive& archive, const ObjectDesc& d) {
   };
   for (std::size_t k = 0; k < d.pins.size(); ++k) check("pins[" + std::to_string(k) + "].particle", d.pins[k].particle);
   for (std::size_t k = 0; k < d.loads.size(); ++k) check("loads[" + std::to_string(k) + "].particle", d.loads[k].particle);
+  for (std::size_t k = 0; k < d.cuts.size(); ++k) {
+    for (std::size_t j = 0; j < d.cuts[k].particles.size(); ++j) {
+      check("cuts[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']', d.cuts[k].particles[j]);
+    }
+  }
   for (std::size_t k = 0; k < d.kinds.size(); ++k) {
     for (std::size_t j = 0; j < d.kinds[k].particles.size(); ++j) {
       check("kinds[" + std::to_string(k) + "].particles[" + std::to_string(j) + ']', d.kinds[k].particles[j]);
@@ -88,6 +94,18 @@ void check_particles(Archive& archive, const ObjectDesc& d) {
   }
 }
 
+/// Checks what a material needs beside it.
+template <class Archive>
+void check_material(Archive& archive, const ObjectDesc& d) {
+  using enum ArrangeKind;
+  constexpr std::array kKnown{Single, Line, Ring, Spiral, Grid, Curve, Ball, Fill};
+  const bool known = std::find(kKnown.begin(), kKnown.end(), d.particles.arrange) != kKnown.end();
+  archive.check(!d.skeleton.empty(), "material", "expected a skeleton, whose volume has the material", "none", "add 'skeleton'");
+  archive.check(known || d.separate, "material", "expected particles in a line, ring, spiral, curve, grid, ball or filled mesh, or bodies of their own",
+                "arrange: " + std::string(name_of(d.particles.arrange)), "give 'mass' and 'interactions' instead");
+  archive.check(!d.particles.mass, "particles.mass", "expected either a mass or a material", "both", "leave out one of the two");
+}
+
 template <class Archive>
 void fields(Archive& archive, ObjectDesc& d) {
   archive.required("name", d.name, identifier(), "unique; objects are numbered in the order of their names");
@@ -96,6 +114,8 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("kinds", d.kinds, {}, "hinges and types; particles that are not named are standard particles of type 0");
   archive("hinges_join", d.hinges_join, {}, "whether the interactions also act between two hinges");
   archive("interactions", d.interactions, {}, "laws that act between the particles");
+  archive("material", d.material, {},
+          "physical properties, from which masses, moments, bonds, damping and contact follow; or the name of one of 'materials'. Grids become blocks and sheets, balls and filled meshes solids, lines, rings, spirals and curves round rods of the volume that the surface encloses; absent: these have keys of their own");
   archive("skeleton", d.skeleton, {}, "primitives that the particles carry; the surface is where their field equals iso; absent: no surface");
   archive("iso", d.iso, inside(0.0, 1.0, kNumber), "value of the field on the surface");
   archive("blend", d.blend, {}, "how the fields of its particles combine; absent: they sum");
@@ -108,6 +128,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("rayleigh", d.rayleigh, {}, "damping of motion and deformation by alpha M + beta K; absent: none");
   archive("pins", d.pins, {}, "particles whose position or orientation is held");
   archive("loads", d.loads, {}, "external forces and torques");
+  archive("cuts", d.cuts, {}, "bonds that break at given times, as with 'breaking'");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
   archive("look", d.look, {}, "appearance in pictures");
@@ -125,9 +146,13 @@ void fields(Archive& archive, ObjectDesc& d) {
                   "expected the object's volume to be held by primitive", d.volume ? std::string(name_of(d.volume->of)) : "not held",
                   "add 'volume: {of: primitive}'");
   }
+  archive.check(d.cuts.empty() || !d.interactions.empty() || d.material, "cuts", "expected interactions that can be cut", "none",
+                "add 'interactions' or remove 'cuts'");
+  archive.check(d.cuts.empty() || !d.volume, "cuts", "expected an object that stays one body beside 'volume'", "cuts", "");
   archive.check(!d.blend || d.blend->fade == 0.0 || d.breaking || !archive.sound("breaking"), "blend.fade", "expected 'breaking' for bonds that fade", "none", "");
-  archive.check(!d.breaking || !d.interactions.empty(), "breaking", "expected interactions that can break", "none",
+  archive.check(!d.breaking || !d.interactions.empty() || d.material, "breaking", "expected interactions that can break", "none",
                 "add 'interactions' or remove 'breaking'");
+  if (d.material) check_material(archive, d);
   archive.check(!(d.breaking && literal_laws(d)), "breaking", "expected no law with paper_literal, which has no energy", "one", "");
   archive.check(!d.contact || !d.skeleton.empty(), "contact", "expected a skeleton for contact", "none",
                 "add 'skeleton' or remove 'contact'");
@@ -210,6 +235,8 @@ void fields(Archive& archive, Scene& d) {
   archive.required("duration", d.duration, above(0.0, kTime), "length of the animation; frame n shows t = (n - 1) / frame_rate");
   archive("frame_rate", d.frame_rate, above(0.0, kRate), "frames per second");
   archive("gravity", d.gravity, any(kAcceleration), "acceleration of gravity; z is up");
+  archive("gravity_course", d.gravity_course, {}, "a factor of gravity as a function of time; absent: 1");
+  archive("wind", d.wind, {}, "velocity of the medium: the drag of objects with 'medium' is -gamma m (v - wind); absent: at rest");
   archive("planar", d.planar, {}, "motion in a plane: particles keep their z, which must be the same for all, and rotate about z only");
   archive("accuracy", d.accuracy, between(1e-5, 1e-2, kNumber),
           "error of positions relative to the size of the bodies, until a scene becomes chaotic: sets time step, integrator, contact error, mesh error and noise together, as `supple explain` prints; other keys override what it sets; absent: every stage has its own default");

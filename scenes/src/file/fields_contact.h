@@ -11,11 +11,25 @@
 
 namespace supple::scenes {
 
+/// Of a lattice of bonds that act between two particles each (Cauchy's relation).
+inline constexpr double kLargestPoissonsRatio = 0.25;
+
+template <class Archive>
+void fields(Archive& archive, SubstanceDesc& d) {
+  archive.required("youngs_modulus", d.youngs_modulus, above(0.0, kPressure), "E, the stiffness in stretching and bending");
+  archive.required("density", d.density, above(0.0, kDensity), "mass of the volume that the surface encloses at the start");
+  archive("poissons_ratio", d.poissons_ratio, between(0.0, kLargestPoissonsRatio, kNumber),
+          "nu, contraction across over extension along, of blocks and sheets; bonds between pairs carry at most 0.25. Rods do not contract");
+  archive("damping_ratio", d.damping_ratio, between(0.0, 1.0, kNumber),
+          "damping of the slowest free vibration over the critical one; replaced by 'rayleigh'. In contact it sets the dissipation for blows at a tenth of the speed of sound sqrt(E / density)");
+  archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient of the surface");
+}
+
 template <class Archive>
 void fields(Archive& archive, MaterialDesc& d) {
-  archive("modulus", d.modulus, above(0.0, kPressure), "P: the pressure inside is P (f - iso), f the field");
-  archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient mu; a pair has sqrt(mu_A mu_B)");
-  archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "damping d of Hunt & Crossley 1975; no rebound is faster than 1/d");
+  archive("modulus", d.modulus, above(0.0, kPressure).or_auto(), "P: the pressure inside is P (f - iso), f the field; auto: 1e4, or by the object's 'material'");
+  archive("friction", d.friction, between(0.0, 100.0, kNumber).or_auto(), "Coulomb coefficient mu; a pair has sqrt(mu_A mu_B); auto: 0, or by the object's 'material'");
+  archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed).or_auto(), "damping d of Hunt & Crossley 1975; no rebound is faster than 1/d; auto: 0, or by the object's 'material'");
   archive("self", d.self, {}, "contact between parts of the object; absent: true. Parts that no path of the blending graph connects touch as bodies of their own. Groups that are connected through others only (the fingers of a hand) touch by their own fields, without those of the others; in an object with 'volume' all groups that do not blend directly do so. Parts joined by a bond never touch. Parts that overlap at the start, and parts whose bond broke or whose blend faded, touch once they have been apart");
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "file/course.h"
 #include "file/fields_rules.h"
 #include "file/read_scene_faults.h"
 
@@ -21,26 +22,32 @@ void fields(Archive& archive, ParticlesDesc& d) {
     return rule.only("arrange", d.arrange, kinds);
   };
   archive("arrange", d.arrange, {}, "arrangement of the particles; line, ring, grid and spiral lie in the x-y plane");
-  archive.required("count", d.count, only(between(1.0, kMostCount, kNumber), {Line, Ring, Spiral}), "number of particles");
-  archive.required("radius", d.radius, only(above(0.0, kLength), {Ring, Geodesic}), "radius of the circle or sphere");
+  archive.required("count", d.count, only(between(1.0, kMostCount, kNumber), {Line, Ring, Spiral, Curve, Scatter}), "number of particles");
+  archive.required("radius", d.radius, only(above(0.0, kLength), {Ring, Geodesic, Ball, Tube}), "radius of the circle, sphere, ball or tube; a ball holds the particles whose centres are within it");
   archive.required("frequency", d.frequency, only(between(1.0, 300.0, kNumber), {Geodesic}),
                    "parts of each edge of an icosahedron; 10 frequency^2 + 2 particles");
   archive.required("inner_radius", d.inner_radius, only(at_least(0.0, kLength), {Spiral}), "where the spiral begins");
   archive.required("outer_radius", d.outer_radius, only(above(0.0, kLength), {Spiral}), "where the spiral ends");
   archive("turns", d.turns, only(up_to(1000.0, kNumber), {Spiral}), "number of turns");
-  archive.required("spacing", d.spacing, only(above(0.0, kLength), {Line, Grid}), "distance between neighbours");
+  archive.required("spacing", d.spacing, only(above(0.0, kLength), {Line, Grid, Ball, Tube, Scatter, Fill}), "distance between neighbours; scatter: the least distance; ball and fill: of a cubic lattice");
   archive.required("columns", d.columns, only(between(1.0, 1e4, kNumber), {Grid}), "number along x");
   archive.required("rows", d.rows, only(between(1.0, 1e4, kNumber), {Grid}), "number along y");
   archive("layers", d.layers, only(between(1.0, 1e4, kNumber), {Grid}), "number along z");
-  archive.required("file", d.file, only(file_name(), {File}), "CSV of x, y, z [m], relative to the scene's folder");
+  archive.required("length", d.length, only(above(0.0, kLength), {Tube}), "length of the tube along z, about its middle; its particles lie on rings");
+  archive.required("points", d.points, only(any(kLength).items(2, 10000), {Curve}), "points through which a smooth curve passes (Catmull-Rom); particles lie on it at equal distances, their x along it");
+  archive.required("size", d.size, only(above(0.0, kLength), {Scatter}), "edges of the box, about its middle, in which particles lie at random");
+  archive("seed", d.seed, only(between(0.0, 1e9, kNumber), {Scatter}), "another seed gives other places");
+  archive.required("file", d.file, only(file_name(), {File, Fill}),
+                   "relative to the scene's folder. file: particles as CSV of x, y, z [m], or as CSV with a line of names or PLY with columns of these names: x, y, z; nx, ny, nz (normal); radius (of inertia) [m]; mass [kg]; qw, qx, qy, qz (orientation); vx, vy, vz [m/s]. fill: closed mesh, OBJ or PLY [m], whose inside is filled with particles");
   archive("normal", d.normal, only({}, {Ring, Spiral}), "direction of the particle normals: along the axis, or outward from the curve");
+  archive("own_normal", d.own_normal, direction(), "direction of the normal in each particle's frame, where a file gives none");
   archive("disorder", d.disorder, at_least(0.0, kLength), "each particle is moved at random by at most this, the same in every run");
   archive("at", d.at, any(kLength), "position of the origin of the arrangement");
   archive("axis", d.axis, direction(), "direction of the z axis of the arrangement");
   archive("angle_deg", d.angle, degrees(-360.0, 360.0), "rotation of the arrangement about its own z axis, before the others");
   archive("velocity", d.velocity, any(kSpeed), "initial velocity");
   archive("spin", d.spin, any(kSpin), "initial angular velocity of the whole about its centre of mass");
-  archive("mass", d.mass, above(0.0, kMass), "mass of one particle");
+  archive("mass", d.mass, above(0.0, kMass).or_auto(), "mass of one particle; auto: 1 kg, or by the object's 'material'");
   archive("inertia_radius", d.inertia_radius, above(0.0, kLength).or_auto(),
           "a in the moment of inertia 2/5 m a^2; auto: half the distance to the nearest neighbour. Single particles, and those of an object with `separate`, have the moments of the solid that each carries instead, and their frames are turned to its principal axes");
   archive("inertia_axes", d.inertia_axes, at_least(0.0, kLength),
@@ -55,6 +62,12 @@ void fields(Archive& archive, ParticlesDesc& d) {
                   "expected more than inner_radius = " + number_text(d.inner_radius) + " [m]", number_text(d.outer_radius),
                   "");
   }
+  if (d.arrange == Ball || d.arrange == Tube) {
+    const double across = 2.0 * d.radius / d.spacing, along = d.arrange == Tube ? d.length / d.spacing : across;
+    archive.check(!(d.spacing > 0.0) || 4.0 * across * std::max(along, 1.0) * (d.arrange == Ball ? across : 1.0) <= 8.0 * kMostCount, "spacing",
+                  "expected at most 1000000 particles", "more", "enlarge it");
+  }
+  if (d.arrange == Curve) archive.check(d.count >= 2, "count", "expected a whole number >= 2 for a curve", std::to_string(d.count), "");
   if (d.arrange == Grid) {
     const double all = double(d.columns) * d.rows * d.layers;
     archive.check(all <= kMostCount, d.layers > 1 ? "layers" : "rows", "expected at most 1000000 particles", number_text(all), "");
@@ -71,10 +84,44 @@ void fields(Archive& archive, KindDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, CourseKeyDesc& d) {
+  archive.required("time", d.time, at_least(0.0, kTime), "time of the value");
+  archive.required("factor", d.factor, any(kNumber), "value at that time");
+}
+
+template <class Archive>
+void fields(Archive& archive, CourseDesc& d) {
+  archive("expression", d.expression, {}, "of the time t: \"sin(2*pi*t/(1 s))\", with the functions of ${expressions}; taken at a 64th of a frame, linear in between");
+  archive("keys", d.keys, {}, "instead: values at rising times, linear in between, constant before and after");
+  archive.check(d.expression.empty() != d.keys.empty(), "", "expected either expression or keys", d.keys.empty() ? "neither" : "both", "");
+  for (std::size_t k = 1; k < d.keys.size(); ++k) {
+    archive.check(d.keys[k].time > d.keys[k - 1].time, "keys[" + std::to_string(k) + "].time", "expected a time after that of the key before", number_text(d.keys[k].time), "");
+  }
+  if (d.expression.empty()) return;
+  if (const auto fault = fault_of_course(d.expression)) archive.check(false, "expression", fault->expected, fault->found, fault->hint);
+}
+
+template <class Archive>
+void fields(Archive& archive, WindDesc& d) {
+  archive.required("velocity", d.velocity, any(kSpeed), "velocity of the medium");
+  archive("course", d.course, {}, "a factor of the velocity as a function of time; absent: 1");
+}
+
+template <class Archive>
+void fields(Archive& archive, CutDesc& d) {
+  archive.required("time", d.time, above(0.0, kTime), "when the bonds break: at the end of the step that reaches it");
+  archive("particles", d.particles, Rule{.quantity = kNumber, .low = -kMostCount, .high = kMostCount}, "all bonds between two of these; negative numbers count from the end");
+  archive("at", d.at, any(kLength), "instead: all bonds that cross a plane at the start; a point of it");
+  archive("normal", d.normal, direction(), "of that plane");
+  archive.check(d.particles.empty() == d.at.has_value(), "", "expected either particles or at", d.at ? "both" : "neither", "");
+}
+
+template <class Archive>
 void fields(Archive& archive, PinDesc& d) {
   archive.required("particle", d.particle, between(-kMostCount, kMostCount, kNumber), "number of the particle: from 0, negative from the end");
   archive("position", d.position, {}, "whether the position is held");
   archive("orientation", d.orientation, {}, "whether the orientation is held");
+  archive("until", d.until, above(0.0, kTime), "time from which the particle is free; absent: never");
 }
 
 template <class Archive>
@@ -85,6 +132,7 @@ void fields(Archive& archive, LoadDesc& d) {
   archive("from", d.from, at_least(0.0, kTime), "time at which the load begins");
   archive("until", d.until, above(0.0, kTime), "time at which the load ends; absent: never");
   archive("ramp", d.ramp, at_least(0.0, kTime), "time of the linear rise from 'from' and of the linear fall to 'until'");
+  archive("course", d.course, {}, "a factor of force and torque as a function of time; absent: 1");
   archive.check(d.until > d.from, "until", "expected more than from = " + number_text(d.from) + " [s]", number_text(d.until), "");
 }
 
@@ -94,11 +142,16 @@ void fields(Archive& archive, LoadDesc& d) {
     case ArrangeKind::Single: return 1;
     case ArrangeKind::Line:
     case ArrangeKind::Ring:
+    case ArrangeKind::Curve:
+    case ArrangeKind::Scatter:
     case ArrangeKind::Spiral: return d.count;
     case ArrangeKind::Grid:
       if (double(d.columns) * d.rows * d.layers > kMostCount) break;
       return d.columns * d.rows * d.layers;
     case ArrangeKind::Geodesic: return 10 * d.frequency * d.frequency + 2;
+    case ArrangeKind::Ball:
+    case ArrangeKind::Tube:
+    case ArrangeKind::Fill:
     case ArrangeKind::File: break;
   }
   return std::nullopt;

@@ -30,6 +30,7 @@ objects:
 | `include` | the name of a file, or a list of them | files whose keys are merged into this one |
 | `variables` | a mapping of names to values | values for expressions |
 | `defaults` | a mapping of lists of the scene to mappings | keys of every item of a list |
+| `materials` | a mapping of names to mappings | materials that objects may name, `material: jelly`, in place of a mapping |
 | `repeat` | a count, or a mapping of indices to counts | in an item of a list: how often it stands there |
 
 - **Expressions** stand between `${` and `}`: numbers, numbers with units, variables, `+ - * / ^`, parentheses, `pi`, and `sqrt`, `abs`,
@@ -41,6 +42,7 @@ objects:
 - **Files** that a scene names are, after links are resolved, in its own folder or below it. Others need `--allow-path`.
 - **Includes** are such files. Mappings are merged, lists of mappings joined; the scene's own keys win, and so does a later file
   over an earlier one. Files that an included file names are relative to the scene.
+  `include: supple:materials` is part of the program: it has the materials `jelly`, `rubber`, `foam`, `clay` and `steel`.
 
 )";
 
@@ -190,6 +192,8 @@ std::string scene_json_schema() {
   Json& properties = out["properties"];
   properties["include"] = {{"anyOf", Json::array({{{"type", "string"}}, {{"type", "array"}, {"items", {{"type", "string"}}}}})},
                            {"description", "files of the scene's folder whose keys are merged into this one"}};
+  properties["materials"] = {{"type", "object"}, {"description", "materials that objects name"}};
+  properties["objects"]["items"]["properties"]["material"]["anyOf"].push_back({{"type", "string"}});
   properties["variables"] = {{"type", "object"}, {"description", "names and values for expressions"}};
   properties["defaults"] = {{"type", "object"}, {"description", "keys of every item of the named lists"}};
   return out.dump(2) + '\n';

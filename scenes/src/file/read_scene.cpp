@@ -157,6 +157,14 @@ void read_accuracy(const Node& root, Scene& scene) {
   if (accuracy.ok && accuracy.value > 0.0) set_by_accuracy(accuracy.value, scene);
 }
 
+/// Objects with a material touch others, unless `contact` says something else. @pre the objects are in the order of the file
+void touch_by_material(const Node& root, Scene& scene) {
+  const std::vector<Node*>& items = root.find("objects")->value->items;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    if (scene.objects[i].material && items[i]->find("contact") == nullptr) scene.objects[i].contact.emplace();
+  }
+}
+
 }  // namespace
 
 int Scene::frame_count() const { return 1 + static_cast<int>(std::floor(duration * frame_rate + 1e-9)); }
@@ -206,6 +214,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
     archive.finish();
   }
   faults.raise();
+  touch_by_material(*root, scene);
   // Ids follow names, so the order of the file changes no bit.
   const auto by_name = [](const auto& a, const auto& b) { return a.name < b.name; };
   std::sort(scene.objects.begin(), scene.objects.end(), by_name);

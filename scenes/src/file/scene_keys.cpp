@@ -238,7 +238,7 @@ class Touching {
   /// Whether objects may touch each other, or parts of one.
   [[nodiscard]] bool among_objects() const {
     for (const ObjectDesc& object : scene_.objects) {
-      if (object.contact && (object.separate || object.breaking || object.blend)) return true;
+      if (object.contact && (object.separate || object.breaking || !object.cuts.empty() || object.blend)) return true;
     }
     for (auto a = with_contact_.begin(); a != with_contact_.end(); ++a) {
       if (std::any_of(std::next(a), with_contact_.end(), [&](const std::string& b) { return may_touch(*a, b); })) return true;

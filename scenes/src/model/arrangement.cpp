@@ -4,14 +4,72 @@
 #include <vector>
 
 #include "file/fields_particles.h"
+#include "supple/core/error.h"
 #include "supple/core/integrate.h"
-#include "supple/core/io/mesh_files.h"
+#include "supple/core/io/particle_files.h"
+#include "supple/core/io/read_mesh.h"
+#include "supple/implicit/mesh_solid.h"
 
 namespace supple::scenes {
 namespace {
 
 core::NormalDirection direction_of(NormalKind normal) {
   return normal == NormalKind::Radial ? core::NormalDirection::Radial : core::NormalDirection::Axis;
+}
+
+constexpr auto kMost = static_cast<std::size_t>(kMostCount);
+
+/// The points of a cubic lattice about the middle of a closed mesh that lie inside it.
+core::Arrangement fill_mesh(const Scene& scene, const ParticlesDesc& d, const std::string& key, ModelFaults& faults) try {
+  core::Arrangement out;
+  const auto read = faults.read(key + ".file", [&] { return io::read_mesh(named_file(files_of(scene), d.file)); });
+  if (!read) return out;
+  const implicit::MeshSolid solid(*read, {.slope = 1.0, .pose = {}});
+  const Box box = solid.surface_box();
+  const Vec3 middle = 0.5 * (box.lower + box.upper), reach = (0.5 * box.extent() / d.spacing).array().floor();
+  if (8.0 * (reach + Vec3::Constant(0.5)).prod() > 8.0 * kMostCount) {
+    faults.add(key + ".spacing", "expected at most " + number_text(8.0 * kMostCount) + " points of a lattice around the mesh", "more", "enlarge it");
+    return out;
+  }
+  std::vector<Vec3> row;
+  std::vector<double> value;
+  for (double z = -reach.z(); z <= reach.z(); z += 1.0) {
+    for (double y = -reach.y(); y <= reach.y(); y += 1.0) {
+      row.clear();
+      for (double x = -reach.x(); x <= reach.x(); x += 1.0) row.emplace_back(middle + d.spacing * Vec3(x, y, z));
+      value.resize(row.size());
+      solid.evaluate(row, value);
+      for (std::size_t k = 0; k < row.size(); ++k) {
+        if (!(value[k] >= 0.0)) continue;
+        out.position.push_back(row[k]);
+        out.orientation.push_back(Quat::Identity());
+      }
+    }
+  }
+  if (out.size() == 0) faults.add(key + ".spacing", "expected a spacing that leaves particles inside the mesh", number_text(d.spacing), "reduce it");
+  return out;
+} catch (const Error& error) {
+  if (error.kind() != ErrorKind::Scene) throw;
+  const Fault& fault = error.faults().front();
+  faults.add(key + ".file", fault.expected, fault.found, fault.hint);
+  return {};
+}
+
+core::Arrangement along_curve(const ParticlesDesc& d, const std::string& key, ModelFaults& faults) {
+  for (std::size_t k = 1; k < d.points.size(); ++k) {
+    if (d.points[k] != d.points[k - 1]) continue;
+    faults.add(key + ".points[" + std::to_string(k) + ']', "expected a point apart from the one before it", "the same", "");
+    return {};
+  }
+  return core::arrange_curve(d.points, d.count);
+}
+
+core::Arrangement scattered(const ParticlesDesc& d, const std::string& key, ModelFaults& faults) {
+  core::Arrangement out = core::arrange_scatter(d.size, d.count, d.spacing, d.seed);
+  if (out.size() == static_cast<std::size_t>(d.count)) return out;
+  faults.add(key + ".count", "expected a count for which a hundred tries for each particle find places", "only " + std::to_string(out.size()) + " places",
+             "reduce 'count' or 'spacing', or enlarge 'size'");
+  return {};
 }
 
 /// The shortest rotation from z to a direction.
@@ -34,9 +92,13 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std:
       out = core::arrange_spiral(d.count, d.inner_radius, d.outer_radius, d.turns, direction_of(d.normal));
       break;
     case ArrangeKind::Geodesic: out = core::arrange_geodesic(d.frequency, d.radius); break;
+    case ArrangeKind::Ball: out = core::arrange_ball(d.radius, d.spacing); break;
+    case ArrangeKind::Tube: out = core::arrange_tube(d.radius, d.length, d.spacing); break;
+    case ArrangeKind::Curve: out = along_curve(d, key, faults); break;
+    case ArrangeKind::Scatter: out = scattered(d, key, faults); break;
+    case ArrangeKind::Fill: out = fill_mesh(scene, d, key, faults); break;
     case ArrangeKind::File:
-      out.position = faults.read(key + ".file", [&] { return io::read_points_csv(named_file(files_of(scene), d.file), static_cast<std::size_t>(kMostCount)); }).value_or(std::vector<Vec3>());
-      out.orientation.assign(out.position.size(), Quat::Identity());
+      out = faults.read(key + ".file", [&] { return io::read_particles(named_file(files_of(scene), d.file), kMost); }).value_or(core::Arrangement());
       break;
   }
   if (d.disorder > 0.0) core::disorder(out, d.disorder);

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <span>
 
+#include "file/course.h"
 #include "model/arrangement.h"
+#include "model/material.h"
 #include "model/model_contact.h"
 #include "model/model_faults.h"
 #include "model/model_laws.h"
@@ -73,6 +77,26 @@ class CarriedSolids {
   std::map<std::vector<std::uint32_t>, CarriedSolid> solids_;
 };
 
+constexpr double kUnitMass = 1.0;  // [kg], of a particle where the scene says nothing
+
+/// @param volumes  of the particles, where the object has a material
+std::vector<double> masses_of(const ObjectDesc& d, const core::Arrangement& arrangement, std::span<const double> volumes) {
+  std::vector<double> mass = arrangement.mass;
+  if (mass.empty()) mass.assign(arrangement.size(), d.particles.mass.value_or(kUnitMass));
+  for (std::size_t i = 0; i < volumes.size(); ++i) mass[i] = d.material->density * volumes[i];
+  return mass;
+}
+
+Vec3 centre_of(std::span<const Vec3> position, std::span<const double> mass) {
+  Vec3 sum = Vec3::Zero();
+  double all = 0.0;
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    sum += mass[i] * position[i];
+    all += mass[i];
+  }
+  return sum / all;
+}
+
 /// Particles of one object.
 void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
                    ModelFaults& faults) {
@@ -99,9 +123,13 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
 
   const PointTree tree(arrangement.position);
   const std::vector<double> nearest = tree.nearest_distances();
-  Vec3 centre = Vec3::Zero();
-  for (const Vec3& p : arrangement.position) centre += p;
-  centre /= n;  // all masses of an object are equal
+  std::vector<double> volumes;
+  if (d.material) {
+    volumes = material_volumes(d, key, arrangement, object.skeleton, faults);
+    object.solid_volume = std::accumulate(volumes.begin(), volumes.end(), 0.0);
+  }
+  const std::vector<double> masses = masses_of(d, arrangement, volumes);
+  const Vec3 centre = centre_of(arrangement.position, masses);
   // The frame of a single particle is turned to the principal axes of its solid; no laws depend on it.
   CarriedSolids solids(d, object.skeleton, n, scene.planar);
   std::vector<Quat> turn(n, Quat::Identity());
@@ -109,13 +137,15 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     Vec3 axes = d.particles.inertia_axes;
     if (d.particles.inertia_radius) {
       axes.setConstant(*d.particles.inertia_radius);
+    } else if (axes.isZero() && !arrangement.inertia_radius.empty()) {
+      axes.setConstant(arrangement.inertia_radius[i]);
     } else if (axes.isZero() && (n == 1 || d.separate)) {
       const CarriedSolid& lone = solids.of(i);
       axes = lone.axes;
       if (scene.planar) axes.setConstant(std::sqrt(0.5 * (axes.x() * axes.x() + axes.y() * axes.y())));  // it turns about z alone
       turn[i] = lone.turn;
     } else if (axes.isZero()) {
-      axes.setConstant(0.5 * nearest[i]);
+      axes.setConstant(d.material ? cube_inertia_radius(volumes[i]) : 0.5 * nearest[i]);
     }
     if (!(axes.maxCoeff() > 0.0) && !faults.has(key + ".iso")) {  // without a surface there is no solid
       faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
@@ -123,18 +153,19 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
                       : d.skeleton.empty() ? "a single particle without a surface: this key is required"
                                            : "no point was found where the field of its skeleton reaches the iso value");
     }
-    const Vec3 inertia = principal_moments(d.particles.mass, axes);
+    const Vec3 inertia = principal_moments(masses[i], axes);
     Quat q = arrangement.orientation[i];
     if (turn[i].w() != 1.0) q = (q * turn[i]).normalized();
-    model.particles.mass.push_back(d.particles.mass);
+    model.particles.mass.push_back(masses[i]);
     model.particles.inertia.push_back(inertia);
-    model.particles.normal.push_back(turn[i].conjugate() * Vec3::UnitZ());
+    model.particles.normal.push_back(turn[i].conjugate() * (arrangement.normal.empty() ? d.particles.own_normal.normalized() : arrangement.normal[i]));
     model.particles.object.push_back(static_cast<std::uint32_t>(model.objects.size()));
     model.particles.pinned.push_back(0);
     model.particles.kind.push_back(0);
     model.initial.position.push_back(arrangement.position[i]);
     model.initial.orientation.push_back(q);
-    model.initial.velocity.push_back(d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
+    const Vec3 own = arrangement.velocity.empty() ? Vec3(Vec3::Zero()) : arrangement.velocity[i];
+    model.initial.velocity.push_back(own + d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
     model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * d.particles.spin));
     if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff());
     // Bodies that only meet by their surfaces may begin anywhere; what begins in one place has no distance to resolve.
@@ -147,22 +178,78 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
   if (n > 1) object.rest_diameter = tree.largest_distance();
 }
 
-void add_pins_and_loads(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model,
+/// Null without a course; a fault at `key` where its expression has no value at some time.
+std::shared_ptr<const core::Course> course_in(const Scene& scene, const std::optional<CourseDesc>& d, const std::string& key, ModelFaults& faults) try {
+  return course_of(d, scene);
+} catch (const ExpressionFault& fault) {
+  faults.add(key + ".expression", fault.expected, fault.found, fault.hint);
+  return nullptr;
+}
+
+void add_pins_and_loads(const Scene& scene, const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model,
                         ModelFaults& faults) {
   const std::uint32_t n = object.last - object.first;
   for (std::size_t k = 0; k < d.pins.size(); ++k) {
     const auto index = particle_index(d.pins[k].particle, n, key + ".pins[" + std::to_string(k) + "].particle", faults);
     if (!index) continue;
-    std::uint8_t& pinned = model.particles.pinned[object.first + *index];
-    if (d.pins[k].position) pinned |= core::kPinPosition;
-    if (d.pins[k].orientation) pinned |= core::kPinOrientation;
+    const auto pins = static_cast<std::uint8_t>((d.pins[k].position ? core::kPinPosition : 0) | (d.pins[k].orientation ? core::kPinOrientation : 0));
+    if (std::isfinite(d.pins[k].until)) {
+      model.releases.push_back({object.first + *index, pins, d.pins[k].until});
+    } else {
+      model.particles.pinned[object.first + *index] |= pins;
+    }
   }
   for (std::size_t k = 0; k < d.loads.size(); ++k) {
     const LoadDesc& load = d.loads[k];
     const auto index = particle_index(load.particle, n, key + ".loads[" + std::to_string(k) + "].particle", faults);
     if (!index) continue;
+    const std::shared_ptr<const core::Course> course = course_in(scene, load.course, key + ".loads[" + std::to_string(k) + "].course", faults);
     model.interactions.external.push_back(
-        {object.first + *index, load.force, load.torque, load.from, load.until, load.ramp});
+        {object.first + *index, load.force, load.torque, load.from, load.until, load.ramp, course});
+  }
+}
+
+/// Gravity with a course, and the push of the wind gamma m w, are loads on each particle.
+void add_changing_fields(const Scene& scene, Model& model, ModelFaults& faults) {
+  const double forever = std::numeric_limits<double>::infinity();
+  const auto add = [&](std::uint32_t i, const Vec3& force, const std::shared_ptr<const core::Course>& course) {
+    model.interactions.external.push_back({i, force, Vec3::Zero(), 0.0, forever, 0.0, course});
+  };
+  if (scene.gravity_course && !scene.gravity.isZero()) {
+    const auto course = course_in(scene, scene.gravity_course, "gravity_course", faults);
+    model.interactions.gravity.setZero();
+    for (std::uint32_t i = 0; i < model.particles.size(); ++i) add(i, model.particles.mass[i] * scene.gravity, course);
+  }
+  if (!scene.wind || scene.wind->velocity.isZero()) return;
+  const auto course = course_in(scene, scene.wind->course, "wind.course", faults);
+  for (std::size_t k = 0; k < scene.objects.size(); ++k) {
+    if (!scene.objects[k].medium || scene.objects[k].medium->linear == 0.0) continue;
+    for (std::uint32_t i = model.objects[k].first; i < model.objects[k].last; ++i) {
+      add(i, scene.objects[k].medium->linear * model.particles.mass[i] * scene.wind->velocity, course);
+    }
+  }
+}
+
+/// Links that a cut breaks, by their bonds at the start.
+void add_cuts(const ObjectDesc& d, const std::string& key, const ObjectModel& object, Model& model, ModelFaults& faults) {
+  const std::uint32_t n = object.last - object.first;
+  for (std::size_t k = 0; k < d.cuts.size(); ++k) {
+    const CutDesc& cut = d.cuts[k];
+    const std::string place = key + ".cuts[" + std::to_string(k) + ']';
+    std::vector<std::uint8_t> side(n, 0);  // 1: listed, or beyond the plane
+    for (std::size_t j = 0; j < cut.particles.size(); ++j) {
+      if (const auto index = particle_index(cut.particles[j], n, place + ".particles[" + std::to_string(j) + ']', faults)) side[*index] = 1;
+    }
+    for (std::uint32_t i = 0; cut.at && i < n; ++i) side[i] = (model.rest.position[object.first + i] - *cut.at).dot(cut.normal) > 0.0 ? 1 : 0;
+    CutEvent event{.time = cut.time, .links = {}};
+    for (std::uint32_t link = 0; link < model.links.size(); ++link) {
+      const std::uint32_t a = model.links.first[link], b = model.links.second[link];
+      if (a < object.first || a >= object.last) continue;
+      const int sides = side[a - object.first] + side[b - object.first];
+      if (sides == (cut.at ? 1 : 2)) event.links.push_back(link);
+    }
+    if (event.links.empty()) faults.add(place, "expected a bond that is cut", "none", cut.at ? "move the plane between bonded particles" : "name two bonded particles");
+    model.cuts.push_back(std::move(event));
   }
 }
 
@@ -175,6 +262,7 @@ core::LinkRule link_rule(const ObjectDesc& d, std::uint32_t object) {
     rule.breaking.couple = d.breaking->couple.value_or(rule.breaking.couple);
   }
   if (d.yielding) rule.yield = {d.yielding->energy, d.yielding->time};
+  rule.cut = !d.cuts.empty();
   return rule;
 }
 
@@ -264,7 +352,9 @@ void set_believable(const Scene& scene, const Box& everything, Model& model) {
     for (const ObstacleKeyDesc& key : body.motion.keys) start = std::max(start, key.at.norm());
   }
   std::vector<double> pushed(model.particles.size(), 0.0);
-  for (const core::ExternalLoad& load : model.interactions.external) pushed[load.particle] += load.force.norm();
+  for (const core::ExternalLoad& load : model.interactions.external) {
+    pushed[load.particle] += (load.course ? load.course->largest() : 1.0) * load.force.norm();
+  }
   double acceleration = 0.0;
   for (std::size_t i = 0; i < pushed.size(); ++i) acceleration = std::max(acceleration, pushed[i] / model.particles.mass[i]);
   model.believable = {.size = kBelievable * size + start,
@@ -274,6 +364,15 @@ void set_believable(const Scene& scene, const Box& everything, Model& model) {
 }
 
 }  // namespace
+
+std::vector<std::uint8_t> pinned_at(const Model& model, double time) {
+  constexpr double kRounding = 1e-12;  // of a time that is a sum of steps
+  std::vector<std::uint8_t> pinned = model.held;
+  for (const PinRelease& release : model.releases) {
+    if (time < release.time * (1.0 - kRounding)) pinned[release.particle] |= release.pins;
+  }
+  return pinned;
+}
 
 double size_of(const ObjectModel& object) {
   const double surface = 2.0 * object.iso_radius;
@@ -291,21 +390,21 @@ Model build_model(const Scene& scene, double memory) {
   model.smallest_length = std::numeric_limits<double>::infinity();
   for (const ObjectDesc& d : scene.objects) {
     const std::string key = "objects." + d.name;
-    SUPPLE_EXPECTS(d.particles.mass > 0.0);
+    SUPPLE_EXPECTS(d.particles.mass.value_or(kUnitMass) > 0.0);
     ObjectModel object;
     object.name = d.name;
     add_particles(scene, d, key, object, model, faults);
     if (object.first == object.last) continue;
     if (d.contact) {
-      object.material = {d.contact->modulus, d.contact->friction, d.contact->dissipation};
+      object.material = contact_material(d, object.skeleton);
       object.collides = !object.skeleton.primitive.empty();
-      object.breaks = d.breaking.has_value();
+      object.breaks = d.breaking.has_value() || !d.cuts.empty();
     }
     object.separate = d.separate;
     if (object.collides && !object.separate) divide_by_blend(d, object);
     set_kinds(d, key, object, model, faults);
     object.hinges_join = d.hinges_join;
-    add_pins_and_loads(d, key, object, model, faults);
+    add_pins_and_loads(scene, d, key, object, model, faults);
     model.objects.push_back(std::move(object));
   }
   if (model.particles.size() == 0 && faults.none()) faults.add("objects", "expected at least one object with particles", "none", "");
@@ -315,15 +414,19 @@ Model build_model(const Scene& scene, double memory) {
   for (Vec3& velocity : model.rest.velocity) velocity.setZero();
   for (Vec3& momentum : model.rest.angular_momentum) momentum.setZero();
   if (scene.planar) confine_to_plane(model, faults);
+  model.held = model.particles.pinned;
+  model.particles.pinned = pinned_at(model, 0.0);
   stop_pinned(model);
   expect_resolved(model, faults);
 
   model.interactions.gravity = scene.gravity;
+  add_changing_fields(scene, model, faults);
   std::vector<core::LinkRule> link_rules;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const ObjectDesc& d = scene.objects[i];
     add_laws(d.interactions, model.objects[i], "objects." + d.name, model, faults);
-    if (d.breaking || d.yielding) link_rules.push_back(link_rule(d, static_cast<std::uint32_t>(i)));
+    if (d.material) add_material_laws(d, model.objects[i], "objects." + d.name, model, faults);
+    if (d.breaking || d.yielding || !d.cuts.empty()) link_rules.push_back(link_rule(d, static_cast<std::uint32_t>(i)));
     if (d.rayleigh) {
       const auto object = static_cast<std::uint32_t>(i);
       if (d.rayleigh->mass > 0.0) model.interactions.medium.push_back({object, d.rayleigh->mass, d.rayleigh->mass});
@@ -336,6 +439,8 @@ Model build_model(const Scene& scene, double memory) {
   build_contact(scene, budget, model, faults);
   faults.raise();
   model.links = core::make_links(model.particles, model.rest, model.interactions, link_rules);
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) add_cuts(scene.objects[i], "objects." + scene.objects[i].name, model.objects[i], model, faults);
+  faults.raise();
 
   double cell = std::numeric_limits<double>::infinity();
   double least_own = cell;

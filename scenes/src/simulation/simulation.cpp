@@ -142,6 +142,7 @@ void Simulation::Impl::make_step() {
 /// The length of the step, what its checks compare with, and what of the scene takes part in it.
 void Simulation::Impl::begin_step() {
   drop_results();
+  release_pins();
   if (state.substep == 0) {
     last_frame = state;
     state.halvings = std::max(0, first_halvings(scene, model, integrator, laws, state) + options.finer);

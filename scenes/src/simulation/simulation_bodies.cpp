@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -93,12 +94,42 @@ void Simulation::Impl::divide_anew() {
   frame.pairs_present.reset();
 }
 
+/// Links whose cut is due and that hold.
+std::vector<std::uint32_t> Simulation::Impl::due_cuts() const {
+  constexpr double kRounding = 1e-12;  // of a time that is a sum of steps
+  std::vector<std::uint32_t> due;
+  for (const CutEvent& cut : model.cuts) {
+    if (time() < cut.time * (1.0 - kRounding)) continue;
+    std::copy_if(cut.links.begin(), cut.links.end(), std::back_inserter(due), [&](std::uint32_t link) { return state.links.broken[link] == 0; });
+  }
+  return due;
+}
+
+/// Before a step: frees particles whose pins end, and wakes their bodies.
+void Simulation::Impl::release_pins() {
+  if (model.releases.empty()) return;
+  std::vector<std::uint8_t> now = pinned_at(model, time());
+  if (now == model.particles.pinned) return;
+  std::vector<std::uint32_t> freed;
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    const auto differs = [&](std::uint32_t p) { return now[p] != model.particles.pinned[p]; };
+    if (std::any_of(bodies[i].particle.begin(), bodies[i].particle.end(), differs)) freed.push_back(i);
+  }
+  model.particles.pinned = std::move(now);
+  form_bodies();
+  form_laws();
+  wake(freed);
+  if (!scene.sleep) return;
+  for (const std::uint32_t i : freed) state.sleep.quiet_for[i] = 0.0;
+}
+
 /// Between two steps: breaks and yields links. New pieces get new seeds and forces. The energy of surfaces that no longer
 /// exist is booked with the links.
 void Simulation::Impl::update_links() {
   if (model.links.size() == 0) return;
   const bool fades = age_broken_links(model, dt(), state);
-  const core::LinkChange change = core::update_links({model.particles, state.particles, laws}, model.links, dt(), state.links, state.ledger);
+  const core::LinkChange change =
+      core::update_links({model.particles, state.particles, laws}, model.links, dt(), state.links, state.ledger, due_cuts());
   if (change.any()) form_laws();
   if (change.any() || fades) state.kick.valid = false;
   if (change.broke == 0 && !fades) return;

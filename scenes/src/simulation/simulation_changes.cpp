@@ -58,6 +58,7 @@ void Simulation::Impl::take(State other) {
   state = std::move(other);
   state.particles = std::move(arrays);
   created_before.reset();
+  if (!model.releases.empty()) model.particles.pinned = pinned_at(model, time());
   form_bodies();
   form_laws();
   SUPPLE_EXPECTS(state.samples.size() == bodies.size());

@@ -97,6 +97,8 @@ struct Simulation::Impl {
   void part_bodies();
   void divide_anew();
   void update_links();
+  [[nodiscard]] std::vector<std::uint32_t> due_cuts() const;
+  void release_pins();
   void hold_volumes();
   std::vector<std::uint32_t> wake(const std::vector<std::uint32_t>& which);
   void wake_loaded();

@@ -14,6 +14,11 @@ namespace supple::core {
 struct Arrangement {
   std::vector<Vec3> position;      ///< [m]
   std::vector<Quat> orientation;   ///< body to world
+  // Of particles from files; empty: none are given.
+  std::vector<Vec3> normal{};            ///< unit, body axes
+  std::vector<Vec3> velocity{};          ///< [m/s]
+  std::vector<double> mass{};            ///< [kg]
+  std::vector<double> inertia_radius{};  ///< a in 2/5 m a^2 [m]
   [[nodiscard]] std::size_t size() const noexcept { return position.size(); }
 };
 
@@ -38,6 +43,17 @@ void disorder(Arrangement& arrangement, double distance);
 /// A closed shell: the icosahedron, each edge divided into `frequency` parts and its faces into triangles, projected to the sphere about
 /// the origin; 10 frequency^2 + 2 particles, normals outward, the first and the twelfth opposite. @pre frequency <= 300
 [[nodiscard]] Arrangement arrange_geodesic(int frequency, double radius);
+/// The points of a cubic lattice, one of them the middle, within a ball.
+[[nodiscard]] Arrangement arrange_ball(double radius, double spacing);
+/// Rings about the z axis at equal distances of about `spacing`, from -length / 2 to length / 2, with as many particles as fit around;
+/// normals outward, body x along z.
+[[nodiscard]] Arrangement arrange_tube(double radius, double length, double spacing);
+/// `count` particles at equal distances along the curve through the points (Catmull & Rom 1974, ends doubled), body x along it; body y and the normal turn
+/// with it and no more (parallel transport). @pre count >= 2, at least two points, neighbours apart
+[[nodiscard]] Arrangement arrange_curve(std::span<const Vec3> points, int count);
+/// `count` particles at random in a box about the origin, no two nearer than `apart`; the same in every run. Fewer where a hundred tries for each
+/// particle are not enough. @param size  edges of the box [m]
+[[nodiscard]] Arrangement arrange_scatter(const Vec3& size, int count, double apart, int seed);
 /// One particle at the origin, normal +z.
 [[nodiscard]] Arrangement arrange_single();
 

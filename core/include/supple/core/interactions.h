@@ -87,6 +87,14 @@ struct StiffnessDamping {
   double time = 0.0;  ///< beta [s]
 };
 
+/// A factor as a function of time: linear between the times, constant before the first and after the last.
+struct Course {
+  std::vector<double> time;    ///< [s], rising, at least one
+  std::vector<double> factor;  ///< [1], shape of `time`
+  [[nodiscard]] double at(double t) const;
+  [[nodiscard]] double largest() const;  ///< of the absolute values
+};
+
 /// A force and a torque on one particle during a time window, ramped linearly at both ends.
 struct ExternalLoad {
   std::uint32_t particle = 0;
@@ -95,12 +103,17 @@ struct ExternalLoad {
   double begin = 0.0;           ///< [s]
   double end = 0.0;             ///< [s], the first time without load; may be infinite
   double ramp = 0.0;            ///< rise and fall time inside the window [s]
-  [[nodiscard]] double factor(double time) const;  ///< in [0, 1]
+  std::shared_ptr<const Course> course{};  ///< a factor besides; null: 1
+  [[nodiscard]] double factor(double time) const;  ///< in [0, 1] without a course
   /// Mean of the factor over [from, to], from < to: a step with this mean gets the whole impulse of a load of any duration.
   [[nodiscard]] double mean(double from, double to) const;
   /// Whether the factor changes in [from, to]; a change at either end counts, also one that rounding puts just before `from`: of
   /// successive steps, the one that ends as the load begins and the one after it both return true.
   [[nodiscard]] bool changes(double from, double to) const;
+
+ private:
+  [[nodiscard]] double window(double time) const;
+  [[nodiscard]] double mean_of_window(double from, double to) const;
 };
 
 struct Interactions {

@@ -37,6 +37,7 @@ struct LinkRule {
   std::uint32_t object = 0;
   BreakRule breaking;
   YieldRule yield;
+  bool cut = false;  ///< its links may be named to `update_links`, also without limits
 };
 
 /// All links of the objects that have a rule, sorted by (first, second). Part of a Scene.
@@ -86,7 +87,9 @@ struct LinkedParticles {
 };
 
 /// Between two steps: breaks and yields links by their rules, `dt` after the last call. Their energy is booked as dissipated.
-LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger);
+/// @param cut  links that break in any case
+LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger,
+                        std::span<const std::uint32_t> cut = {});
 
 /// The interactions without the bonds (and friction) of broken links, with the present rest data.
 [[nodiscard]] Interactions intact(const Interactions& interactions, const Links& links, const LinkState& state);

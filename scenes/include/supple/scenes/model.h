@@ -61,6 +61,7 @@ struct ObjectModel {
   std::uint32_t first_volume = 0;         ///< index of `target` in State::volumes
   double volume_cell = 0.0;               ///< cell size of the volume measurement while no kernel is scaled [m]
   double rest_diameter = 0.0;             ///< largest distance of two particles at rest, or twice the iso radius of a single particle [m]
+  double solid_volume = 0.0;              ///< that the surface encloses at the start, where the object has a `material` [m^3]; else 0
   double iso_radius = 0.0;                ///< smallest iso distance of its primitives [m]; 0 without surface
   LookDesc look;                          ///< determines the columns of its meshes
   double cell = 0.0;                      ///< lattice cell of its meshes and grids [m]; 0 without surface
@@ -104,8 +105,24 @@ struct Believable {
   [[nodiscard]] double fastest(double time) const { return margin + speed + acceleration * time; }  ///< [m/s]
 };
 
+/// Pins that end at a time.
+struct PinRelease {
+  std::uint32_t particle = 0;
+  std::uint8_t pins = 0;  ///< core::kPinPosition, kPinOrientation
+  double time = 0.0;      ///< [s]
+};
+
+/// Links that break at a time, whatever their load.
+struct CutEvent {
+  double time = 0.0;  ///< [s]
+  std::vector<std::uint32_t> links;
+};
+
 struct Model {
-  core::ParticleSet particles;
+  core::ParticleSet particles;            ///< with the pins of the present time
+  std::vector<std::uint8_t> held;         ///< pins without an end, shape [particles]
+  std::vector<PinRelease> releases;
+  std::vector<CutEvent> cuts;
   core::ParticleState initial;
   core::ParticleState rest;               ///< rest poses (the initial arrangement)
   core::Interactions interactions;        ///< of the unbroken scene
@@ -126,6 +143,9 @@ struct Model {
   double solid_speed = 0.0;               ///< bound of the speed of obstacles with keys [m/s]
   Believable believable;
 };
+
+/// Pins of all particles at a time, shape [particles].
+[[nodiscard]] std::vector<std::uint8_t> pinned_at(const Model& model, double time);
 
 /// @throws Error{Scene} for faults that only the whole scene shows (a pair naming an absent object, an iso value that no kernel
 /// reaches, two particles at one place with a bond between them ...), with the key concerned.

@@ -33,31 +33,36 @@ struct IntegratorDesc {
   std::optional<double> tolerance;   ///< absent: 1e-6 (adaptive) or 1e-9 (implicit methods)
 };
 
-enum class ArrangeKind : std::uint8_t { Single, Line, Ring, Grid, Spiral, File, Geodesic };
+enum class ArrangeKind : std::uint8_t { Single, Line, Ring, Grid, Spiral, File, Geodesic, Ball, Tube, Curve, Scatter, Fill };
 enum class NormalKind : std::uint8_t { Axis, Radial };
 
 /// objects[].particles
 struct ParticlesDesc {
   ArrangeKind arrange = ArrangeKind::Single;
-  int count = 1;                      ///< line, ring, spiral
-  double radius = 0.0;                ///< ring, geodesic [m]
+  int count = 1;                      ///< line, ring, spiral, curve, scatter
+  double radius = 0.0;                ///< ring, geodesic, ball, tube [m]
   int frequency = 1;                  ///< geodesic: parts of each edge of the icosahedron
   double inner_radius = 0.0;          ///< spiral [m]
   double outer_radius = 0.0;          ///< spiral [m]
   double turns = 1.0;                 ///< spiral
-  double spacing = 0.0;               ///< line, grid [m]
+  double spacing = 0.0;               ///< line, grid, ball, tube, fill; scatter: the least distance [m]
   double disorder = 0.0;              ///< each particle is moved at random by at most this [m]
   int columns = 1;                    ///< grid
   int rows = 1;                       ///< grid
   int layers = 1;                     ///< grid, along z
-  std::string file;                   ///< CSV of x, y, z beside the scene
+  double length = 0.0;                ///< tube, along z [m]
+  std::vector<Vec3> points;           ///< curve: points on its way [m]
+  Vec3 size = Vec3::Zero();           ///< scatter: edges of a box [m]
+  int seed = 1;                       ///< scatter
+  std::string file;                   ///< file: CSV or PLY of particles; fill: OBJ or PLY of a closed mesh; beside the scene
   NormalKind normal = NormalKind::Axis;
+  Vec3 own_normal = Vec3::UnitZ();    ///< direction of the normal in each particle's frame
   Vec3 at = Vec3::Zero();             ///< position of the arrangement's origin [m]
   Vec3 axis = Vec3::UnitZ();          ///< direction of its z axis
   double angle = 0.0;                 ///< rotation about its own z axis, before the others [rad] (key angle_deg)
   Vec3 velocity = Vec3::Zero();       ///< initial [m/s]
   Vec3 spin = Vec3::Zero();           ///< initial, rigid, about the centre of mass [rad/s]
-  double mass = 1.0;                  ///< of one particle [kg]
+  std::optional<double> mass;         ///< of one particle [kg]; absent: 1, or by ObjectDesc::material
   std::optional<double> inertia_radius;  ///< a in 2/5 m a^2 [m]; absent: half the nearest-neighbour distance; single particles have the moments of their solid
   Vec3 inertia_axes = Vec3::Zero();   ///< instead of inertia_radius: semi-axes of a solid ellipsoid in the particle's frame [m]; zero: absent
 };
@@ -146,11 +151,20 @@ struct SkeletonDesc {
   KernelDesc kernel;
 };
 
+/// objects[].material: physical properties from which masses, bonds, damping and contact follow
+struct SubstanceDesc {
+  double youngs_modulus = 0.0;        ///< E [Pa]
+  double density = 0.0;               ///< rho [kg/m^3]
+  double poissons_ratio = 0.2;        ///< nu
+  double damping_ratio = 0.05;        ///< zeta of the slowest free vibration
+  double friction = 0.5;
+};
+
 /// objects[].contact
 struct MaterialDesc {
-  double modulus = 1e4;               ///< P0 [Pa]
-  double friction = 0.0;
-  double dissipation = 0.0;           ///< d [s/m]
+  std::optional<double> modulus;      ///< P0 [Pa]; absent: 1e4, or by ObjectDesc::material
+  std::optional<double> friction;     ///< absent: 0, or by ObjectDesc::material
+  std::optional<double> dissipation;  ///< d [s/m]; absent: 0, or by ObjectDesc::material
   std::optional<bool> self;           ///< absent: true
 };
 
@@ -200,6 +214,27 @@ struct PinDesc {
   int particle = 0;                   ///< negative counts from the end: -1 is the last
   bool position = true;
   bool orientation = true;
+  double until = std::numeric_limits<double>::infinity();  ///< time of its release [s]
+};
+
+/// objects[].cuts[]: bonds that break at a time
+struct CutDesc {
+  double time = 0.0;                  ///< [s]
+  std::vector<int> particles;         ///< all bonds between two of these; negative counts from the end
+  std::optional<Vec3> at;             ///< instead: all bonds across the plane through this point at the start [m]
+  Vec3 normal = Vec3::UnitX();        ///< of that plane
+};
+
+/// keys of a course
+struct CourseKeyDesc {
+  double time = 0.0;                  ///< [s]
+  double factor = 0.0;
+};
+
+/// A factor as a function of time
+struct CourseDesc {
+  std::string expression;             ///< of t [s]
+  std::vector<CourseKeyDesc> keys;    ///< instead: values at times, linear in between
 };
 
 /// objects[].loads[]
@@ -210,6 +245,7 @@ struct LoadDesc {
   double from = 0.0;                  ///< [s]
   double until = std::numeric_limits<double>::infinity();  ///< [s]
   double ramp = 0.0;                  ///< [s]
+  std::optional<CourseDesc> course;   ///< a factor of force and torque
 };
 
 enum class BlendName : std::uint8_t { Sum, Graph, Ricci, Gradient };
@@ -253,6 +289,7 @@ struct ObjectDesc {
   std::vector<KindDesc> kinds;              ///< particles not named are standard, of type 0
   bool hinges_join = false;                 ///< laws also act between two hinges
   std::vector<InteractionDesc> interactions;
+  std::optional<SubstanceDesc> material;    ///< absent: masses, bonds and contact have their own keys
   std::vector<SkeletonDesc> skeleton;
   double iso = 0.5;
   std::optional<BlendDesc> blend;           ///< absent: everything sums
@@ -265,6 +302,7 @@ struct ObjectDesc {
   std::optional<RayleighDesc> rayleigh;
   std::vector<PinDesc> pins;
   std::vector<LoadDesc> loads;
+  std::vector<CutDesc> cuts;
   Vec3 colour = Vec3(0.8, 0.8, 0.8);        ///< sRGB
   double roughness = 0.45;
   LookDesc look;
@@ -283,6 +321,12 @@ struct PairDesc {
   std::optional<double> friction;
   std::optional<double> dissipation;
   std::optional<RestitutionDesc> restitution;
+};
+
+/// wind: motion of the medium in which objects with `medium` drag
+struct WindDesc {
+  Vec3 velocity = Vec3::Zero();       ///< [m/s]
+  std::optional<CourseDesc> course;   ///< a factor of the velocity
 };
 
 enum class SplitName : std::uint8_t { Energy, Contribution };
@@ -425,6 +469,8 @@ struct Scene {
   double duration = 0.0;              ///< [s]
   double frame_rate = 24.0;           ///< [1/s]
   Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
+  std::optional<CourseDesc> gravity_course;  ///< a factor of gravity
+  std::optional<WindDesc> wind;       ///< absent: the medium is at rest
   bool planar = false;                ///< particles keep their z and turn about z only
   std::optional<double> accuracy;     ///< over the size of the bodies [1]; absent: every stage by its own keys
   TimeStepDesc time_step;
