@@ -223,7 +223,12 @@ rm progress
 for signal in INT TERM; do
   "$supple" check "$hostile/huge_ball_about_a_spiral.yaml" --set objects.spiral.particles.count=80 --time-limit 600 > out.txt 2> err.txt &
   run=$!
-  sleep 0.3
+  # A shell without job control starts it with SIGINT ignored: not before its handler is there.
+  for ((k = 0; k < 3000; ++k)); do
+    caught=$(awk '/SigCgt/ {print $2}' "/proc/$run/status")
+    ((0x0$caught & 2)) && break
+    sleep 0.01
+  done
   kill -s $signal "$run" 2> /dev/null
   wait "$run"
   code=$?
