@@ -234,7 +234,7 @@ for signal in INT TERM; do
   code=$?
   [[ $signal == INT && $code == 130 || $signal == TERM && $code == 143 ]] || fault "signal $signal to a check: exit $code, $(cat err.txt)"
 done
-expect 0 'takes more than the limit of 0.1 s of processor time of a check; --time-limit raises the limit' check "$hostile/huge_ball_about_a_spiral.yaml" --time-limit 0.1
+expect 0 'takes more than the limits of a check, 0.1 s of processor time and 200 MB of memory; --time-limit and --memory raise them' check "$hostile/huge_ball_about_a_spiral.yaml" --time-limit 0.1
 expect 2 '--time-limit' check good.yaml --time-limit 0
 
 # Standard streams that are closed: what is printed lands in no file of the run.

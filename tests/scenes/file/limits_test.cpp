@@ -154,7 +154,7 @@ TEST(Check, IsBrokenOffAtItsLimitOfTimeAndByInterrupts) {
   const CheckReport late = check_scene(scene, {}, kCheckMemory, 1e-6);
   EXPECT_FALSE(late.built);
   ASSERT_EQ(late.warnings.size(), 1U);
-  EXPECT_NE(late.warnings[0].find("more than the limit of 1e-06 s of processor time of a check; --time-limit"), std::string::npos) << late.warnings[0];
+  EXPECT_NE(late.warnings[0].find("more than the limits of a check, 1e-06 s of processor time and 200 MB of memory; --time-limit"), std::string::npos) << late.warnings[0];
   const std::atomic<int> signalled{2};
   EXPECT_THROW((void)check_scene(scene, {.interrupt = &signalled}, kCheckMemory, 600.0), Interrupted);
 }
