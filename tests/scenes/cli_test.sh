@@ -223,13 +223,18 @@ rm progress
 for signal in INT TERM; do
   "$supple" check "$hostile/huge_ball_about_a_spiral.yaml" --set objects.spiral.particles.count=80 --time-limit 600 > out.txt 2> err.txt &
   run=$!
-  sleep 0.3
+  # A shell without job control starts it with SIGINT ignored: not before its handler is there.
+  for ((k = 0; k < 3000; ++k)); do
+    caught=$(awk '/SigCgt/ {print $2}' "/proc/$run/status")
+    ((0x0$caught & 2)) && break
+    sleep 0.01
+  done
   kill -s $signal "$run" 2> /dev/null
   wait "$run"
   code=$?
   [[ $signal == INT && $code == 130 || $signal == TERM && $code == 143 ]] || fault "signal $signal to a check: exit $code, $(cat err.txt)"
 done
-expect 0 'takes more than the limit of 0.1 s of processor time of a check; --time-limit raises the limit' check "$hostile/huge_ball_about_a_spiral.yaml" --time-limit 0.1
+expect 0 'takes more than the limits of a check, 0.1 s of processor time and 200 MB of memory; --time-limit and --memory raise them' check "$hostile/huge_ball_about_a_spiral.yaml" --time-limit 0.1
 expect 2 '--time-limit' check good.yaml --time-limit 0
 
 # Standard streams that are closed: what is printed lands in no file of the run.

@@ -127,7 +127,9 @@ Trial judged(const std::string& name, const std::function<void()>& use) {
   return trial;
 }
 
-void check_scene(const scenes::Scene& scene) { (void)scenes::check_scene(scene, {.threads = 1, .delaunay = delaunay()}); }
+void check_scene(const scenes::Scene& scene) {
+  (void)scenes::check_scene(scene, {.threads = 1, .delaunay = delaunay()}, scenes::kCheckMemory, scenes::kCheckSeconds * slowness());
+}
 
 std::string run_two_frames(scenes::Scene scene, const fs::path& folder) {
   check_scene(scene);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "file/processor_limit.h"
+#include "file/work_limit.h"
 #include "file/read_scene_faults.h"
 #include "model/crowded_start.h"
 #include "supple/core/interrupt.h"
@@ -27,17 +27,19 @@ std::string not_solved(const CrowdedStart& crowd) {
          short_text(std::round(crowd.others)) + " others, and solving their contacts takes longer than a check; move them apart";
 }
 
-std::string unfinished(const Scene& scene, double seconds) {
-  return scene.source.string() + ": the scene was counted, but building it and solving its first contacts takes more than the limit of " + short_text(seconds) +
-         " s of processor time of a check; --time-limit raises the limit";
+std::string unfinished(const Scene& scene, double seconds, double build) {
+  return scene.source.string() + ": the scene was counted, but building it and solving its first contacts takes more than the limits of a check, " + short_text(seconds) +
+         " s of processor time and " + bytes_text(build) + " of memory; --time-limit and --memory raise them";
 }
 
 /// What is looked at here does not depend on how exact contacts are, which may take long where they are deep.
 constexpr double kContactError = 0.05;
 
-void build_and_look(Scene scene, const SimulationOptions& options, CheckReport& report) {
+/// @param limit  of the building; what follows has limits of its own
+void build_and_look(Scene scene, const SimulationOptions& options, WorkLimit& limit, CheckReport& report) {
   scene.contact.error = std::max(scene.contact.error, kContactError);
   Simulation simulation(std::move(scene), options);
+  limit.lift();
   try {
     expect_output_sizes(simulation, requested_outputs(simulation.scene()));
   } catch (const Error& error) {
@@ -71,16 +73,16 @@ CheckReport check_scene(const Scene& scene, SimulationOptions options, double bu
     report.warnings.push_back(not_solved(*crowd));
     return report;
   }
-  const ProcessorLimit limit(seconds, options.interrupt);
+  WorkLimit limit(seconds, build, options.interrupt);
   options.questions = true;
   options.memory = build;
   options.interrupt = limit.interrupt();
   try {
     const InterruptScope scope(limit.interrupt());
-    build_and_look(scene, options, report);
+    build_and_look(scene, options, limit, report);
   } catch (const Interrupted&) {
     if (!limit.passed()) throw;
-    report.warnings.push_back(unfinished(scene, seconds));
+    report.warnings.push_back(unfinished(scene, seconds, build));
     report.built = false;
   } catch (const OverBudget& over) {  // by counts that only the model has
     expect_within(scene, over.counts(), allowed);
