@@ -13,24 +13,22 @@ mkdir -p "$work" "$pictures"
 scenes=$(cat <<'LIST'
 ball_hits_spiral|29|A ball hits a spiral that remembers its shape
 spiral_uncoils|60|The spiral is pulled open and coils up again
-two_balls|16|Two balls meet off centre; their surfaces touch without a gap
+two_balls|13|Two balls meet off centre; their surfaces touch without a gap
 ball_on_plate|20|A ball comes to rest on a plate
-ball_in_ring|22|A ball rests on a ring that is too narrow for it
 ball_on_mesh|24|Balls roll off a block from a mesh file
 bounces|14|A ball bounces lower and lower
 newtons_cradle|20|The last ball leaves with the speed of the first
 press_and_belt|30|A press squeezes a ball on a belt
-slide_on_incline|22|Friction holds one table and lets another slide
-worm_curls_up|40|A body that touches itself
+slide_on_incline|6|Friction holds one table and lets another slide
+looks|4|Looks of surfaces
 blending|1|Ways to blend
 kernels|1|Field functions
 primitives|1|Skeleton shapes
-looks|1|Looks of surfaces
 joined_segments|1|Segments with and without bulges where they join
 hand_and_mitten|1|Which parts blend is a graph
 still_life|1|Light between surfaces, by the path tracer
-plate_breaks|24|A plate breaks
-sheet_dents|20|A sheet dents and recovers
+strand_parts|12|Two strands before they part
+bar_with_hinge|20|A bar of two kinds of particles folds at its hinge
 LIST
 )
 

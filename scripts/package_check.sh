@@ -63,6 +63,7 @@ check_deb() {
   [[ -f $sources ]] || sources=/etc/apt/sources.list
   mmdebstrap --quiet --variant=minbase --include=ca-certificates "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$scratch/root" "$sources" || return 1
   cp "$package" "$scratch/root/supple.deb"
+  mount -t proc proc "$scratch/root/proc" || return 1  # by which the tool finds its library
   chroot "$scratch/root" sh -eu -c '
     apt-get -q update && DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends /supple.deb
     cd /root
@@ -70,8 +71,10 @@ check_deb() {
     supple view out/two_balls --progress none && test -s out/two_balls/two_balls_view.html
     supple check ball_hits_spiral
     python3 -c "import supple; print(supple.library(\"two_balls\"))"
-    test -s /usr/share/supple/blender/supple_import.py && test -s /usr/share/man/man1/supple.1' || return 1
-  rm -rf "$scratch/root"
+    test -s /usr/share/supple/blender/supple_import.py && test -s /usr/share/man/man1/supple.1'
+  local result=$?
+  umount "$scratch/root/proc" && rm -rf "$scratch/root"
+  return $result
 }
 
 # check_wheel BUILD_FOLDER: makes the wheel of a build and uses it in a new virtual environment; importing takes less than 0.3 s.

@@ -51,7 +51,8 @@ class Frames {
 
  private:
   scenes::RunView& view() {
-    if (!view_) view_.emplace(scene_, scenes::ViewOptions{.folder = settings_.folder, .threads = 1, .memory = settings_.memory, .interrupt = settings_.interrupt}, settings_.cells);
+    const scenes::ViewOptions options{.folder = settings_.folder, .threads = 1, .memory = settings_.memory, .interrupt = settings_.interrupt};
+    if (!view_) view_.emplace(scene_, options, settings_.cells);
     return *view_;
   }
   static void append(std::string& answer, const std::string& bytes) {

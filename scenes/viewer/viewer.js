@@ -120,7 +120,8 @@
     return { look, mesh, material, wanted: true, drawn: null };
   });
   const dots = (size, colours) => {
-    const points = new T.Points(new T.BufferGeometry(), new T.PointsMaterial({ size, sizeAttenuation: false, vertexColors: colours, depthTest: false, transparent: true }));
+    const material = new T.PointsMaterial({ size, sizeAttenuation: false, vertexColors: colours, depthTest: false, transparent: true });
+    const points = new T.Points(new T.BufferGeometry(), material);
     points.renderOrder = 2;
     points.frustumCulled = false;
     scene.add(points);
@@ -409,7 +410,9 @@
     }
     g.textAlign = "center";
     g.textBaseline = "top";
-    for (let t = Math.ceil(t0 / stepX - 1e-9) * stepX; t <= t1 + 1e-9 * stepX; t += stepX) g.fillText(`${Number(t.toPrecision(3))} s`, Math.min(x(t), width - 14), height - bottom + 3);
+    for (let t = Math.ceil(t0 / stepX - 1e-9) * stepX; t <= t1 + 1e-9 * stepX; t += stepX) {
+      g.fillText(`${Number(t.toPrecision(3))} s`, Math.min(x(t), width - 14), height - bottom + 3);
+    }
     g.lineWidth = 1.4;
     for (const s of chosen) {
       g.strokeStyle = s.colour;

@@ -53,12 +53,19 @@ expect 4 'plain_file' run good.yaml --out plain_file/out --progress none
 expect 4 '--overwrite' run good.yaml --out good --progress none
 expect 2 '' run
 expect 2 "supple: expected a command, found 'rn'; did you mean 'run'? (known: run, render" rn good.yaml
-expect 2 "found 'simulate'; known: run, render, export, info, compare, check, explain, query, bench, reference" simulate good.yaml
+expect 2 "found 'simulate'; known: run, render, export, view, info, compare, check, explain, query, bench, reference" simulate good.yaml
 expect 2 "supple: expected an option, found '--verson'; did you mean '--version'?" --verson
 expect 2 "supple run: expected an option, found '--thread'; did you mean '--threads'?" run good.yaml --thread 2
 expect 2 "supple run: expected an option, found '-out'; did you mean '--out'?" run -out elsewhere good.yaml
 expect 2 "supple check: expected an option, found '--camera'; known: --help, --set, --allow-path, --quiet" check good.yaml --camera=left
 expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
+expect 0 '' view good --progress none --cells 12
+expect 4 "name the scene instead: supple view SCENE --out ." view .
+expect 4 "expected saved states of 'good'" view good.yaml --out nowhere --progress none
+expect 0 '' export good.yaml --out good --gltf --progress none
+expect 0 '' check two_balls
+expect 4 'two_bals' check two_bals
+expect 2 '--size' view good --size none
 expect 2 '1 to 3' run good.yaml --out frames --frames 9 --progress none
 expect 2 '--memory' run good.yaml --out frames --memory nan --progress none
 expect 2 '--memory' check good.yaml --memory 4X

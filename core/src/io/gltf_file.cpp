@@ -196,8 +196,9 @@ Json GltfAnimation::Impl::nodes_and_animation(Json& animation) {
     nodes.push_back({{"name", c.name}, {"camera", k}, {"translation", {c.position[0], c.position[1], c.position[2]}},
                      {"rotation", {c.rotation[0], c.rotation[1], c.rotation[2], c.rotation[3]}}});
     children.push_back(nodes.size() - 1);
-    const bool moves = !std::equal(c.position.begin() + 3, c.position.end(), c.position.begin()) || !std::equal(c.rotation.begin() + 4, c.rotation.end(), c.rotation.begin());
-    if (!moves) continue;
+    const bool stays = std::equal(c.position.begin() + 3, c.position.end(), c.position.begin()) &&
+                       std::equal(c.rotation.begin() + 4, c.rotation.end(), c.rotation.begin());
+    if (stays) continue;
     add_channel(nodes.size() - 1, "translation", "LINEAR", times, c.position, 3);
     add_channel(nodes.size() - 1, "rotation", "LINEAR", times, c.rotation, 4);
   }

@@ -30,7 +30,7 @@ struct Fault {
   std::string found{};     ///< e.g. "-0.2"; may be empty
   std::string hint{};      ///< e.g. "did you mean 'radius'?"; may be empty
 
-  /// place: key: expected, found FOUND; HINT   (without empty parts; control characters and invalid UTF-8 as \xNN)
+  /// place: key: expected, found FOUND; HINT   (without empty parts; control characters and invalid UTF-8 as a backslash, x and two digits)
   [[nodiscard]] std::string message() const;
 };
 

@@ -156,8 +156,8 @@ class UnionUpdater {
 
 /// The surface of a grid by OpenVDB's volumeToMesh (dual contouring without normals), its quadrangles divided, its vertices projected
 /// onto the surface of the field along its gradients, with its normals. Vertices keep their position that Newton's steps do not bring there within half a
-/// cell, or whose triangles would be inverted or intersect others, and all of a closed piece that would be flattened.
-/// @param field  that the grid was made from
+/// cell, or whose triangles would be inverted or intersect others, and all of a closed piece that would be flattened. The field is that of which the grid
+/// was made.
 [[nodiscard]] Mesh mesh_of(const SurfaceGrid& grid, const FieldView& field, const Executor& executor);
 
 /// Writes one .vdb with all grids, by temporary file and rename. @throws Error{Io}
