@@ -63,6 +63,7 @@ struct Simulation::Impl {
   SearchCounts searches;      ///< of the meshes of this state,
   SearchCounts all_searches;  ///< and of all so far
   bool coarse_noted = false;  ///< in the warnings
+  bool divided_noted = false;
   std::optional<double> created_before;  ///< energy unaccounted for where stepping began; none: not looked at yet [J]
 
   // Steps.
@@ -71,6 +72,9 @@ struct Simulation::Impl {
   void step();
   void make_step();
   void refine_step();
+  void advance_particles(double begin, double h);
+  void advance_divided(double begin, double h, int halvings);
+  [[nodiscard]] bool creates_energy(const Energies& before, const core::Ledger& ledger, const Energies& now) const;
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out);
   core::ImplicitContact implicit_contact();
   void commit_friction();
@@ -131,6 +135,8 @@ struct Simulation::Impl {
   const std::vector<Mesh>& pull_meshes();
   double contact_energy();
   Energies energies();
+  /// Of the state within a step, at a time of it; leaves the contacts there in `pulled`. Without springs of friction, which implicit steps do not have.
+  Energies energies_within(double at);
   void book_audits();
 };
 
