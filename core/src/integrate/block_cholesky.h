@@ -1,5 +1,5 @@
 // Cholesky factor of a sparse symmetric matrix of 6x6 blocks. Whole blocks take the place of the scalars of a right-looking method (e.g. Davis 2006,
-// chapter 4), which is several times as fast as these for particles. Its bits depend neither on the processor nor on a linear algebra library.
+// chapter 4). Its bits depend neither on the processor nor on a linear algebra library.
 #pragma once
 
 #include <Eigen/Core>

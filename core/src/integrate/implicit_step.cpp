@@ -33,7 +33,7 @@ class StepPotential {
         inertial += delta.dot(set_.inertia[i].cwiseProduct(delta));
       }
     }
-    return 0.5 / (h_ * h_) * inertial + potential_energy(set_, pose, interactions_) + buffers_.contact.value(pose);
+    return 0.5 / (h_ * h_) * inertial + potential_energy(set_, pose, interactions_) + buffers_.damping.value(pose) + buffers_.contact.value(pose);
   }
 
   /// Computes the loads of the pair laws in `buffers.laws` and the gradient in `buffers.gradient`.
@@ -56,7 +56,8 @@ class StepPotential {
             free_rotation(set_.pinned[i], pose.orientation[i] * inertial - buffers_.laws.torque[i]);
       }
     }
-    if (buffers_.contact.empty()) return;
+    if (buffers_.contact.empty() && buffers_.damping.empty()) return;
+    buffers_.damping.add_gradient(pose, buffers_.gradient);
     buffers_.contact.add_gradient(pose, buffers_.gradient);
     for (std::size_t i = 0; i < n; ++i) {
       const auto row = static_cast<Eigen::Index>(6 * i);
@@ -107,7 +108,8 @@ class StepPotential {
       buffers_.bonded.emplace_back(a, b);
       buffers_.blocks.push_back(h);
     });
-    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& coupled = buffers_.contact.coupled();
+    const std::vector<std::pair<std::uint32_t, std::uint32_t>>&damped = buffers_.damping.coupled(), &coupled = buffers_.contact.coupled();
+    buffers_.bonded.insert(buffers_.bonded.end(), damped.begin(), damped.end());
     if (!buffers_.contact.empty()) buffers_.bonded.insert(buffers_.bonded.end(), coupled.begin(), coupled.end());
     buffers_.hessian.begin(set_.pinned, buffers_.bonded);
     for (std::size_t i = 0; i < set_.size(); ++i) {
@@ -119,7 +121,8 @@ class StepPotential {
       buffers_.hessian.add_particle(static_cast<std::uint32_t>(i), h);
     }
     for (std::size_t k = 0; k < buffers_.blocks.size(); ++k) buffers_.hessian.add_pair(k, buffers_.blocks[k]);
-    buffers_.contact.add_hessian(pose, buffers_.blocks.size(), friction, buffers_.hessian);
+    buffers_.damping.add_hessian(pose, buffers_.blocks.size(), buffers_.hessian);
+    buffers_.contact.add_hessian(pose, buffers_.blocks.size() + damped.size(), friction, buffers_.hessian);
   }
 
   const ParticleSet& set_;
@@ -321,8 +324,6 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
 
   stop_pinned(set, state);
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
-  apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Forward, state, ledger);
-  apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
 
   if (midpoint) {
     buffers.frozen.reset(n);
@@ -340,12 +341,15 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   buffers.contact.begin(set, buffers.points, buffers.start, buffers.flight, {.h = h, .end_factor = midpoint ? 2.0 : 1.0, .slip_factor = midpoint ? kSlipFactor : 1.0},
                         problem.contact != nullptr ? SlowSlip{problem.contact->stick_speed, problem.contact->slow_slip} : SlowSlip{});
 
+  buffers.damping.begin(set, interactions, buffers.start, buffers.flight, h, midpoint);
+
   StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
   // Stiff bonds make free flight a bad first guess: the pose before the step may be a better one.
   buffers.pose = potential.value(buffers.flight) <= potential.value(state) ? buffers.flight : state;
   minimise(settings, potential, buffers, report);
 
   const ParticleState& start = buffers.start;
+  buffers.damping.finish(buffers.pose, dt, buffers.laws, ledger);
   if (problem.contact != nullptr) buffers.contact.finish(buffers.pose, dt, buffers.laws, ledger, problem.contact->load);
   finish(set, start, dt, buffers, state, ledger);
   for (std::size_t i = 0; i < n; ++i) {
@@ -364,8 +368,6 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   }
   book_external_work(set, start, state, buffers.sample.external, ledger);
 
-  apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
-  apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
   return report;
 }

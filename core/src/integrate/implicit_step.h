@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "integrate/contact_term.h"
+#include "integrate/damping_term.h"
 #include "integrate/step_hessian.h"
 #include "supple/core/integrators.h"
 
@@ -12,16 +13,17 @@ namespace supple::core {
 
 struct ImplicitBuffers {
   ForceSample sample;
-  Loads laws;       ///< of the pair laws; at the end of contact, too
+  Loads laws;       ///< of the pair laws; at the end of damping and contact, too
   Loads frozen;     ///< all loads outside the pair laws
   ParticleState flight;  ///< after free flight under the frozen loads
-  ParticleState start;   ///< after the first half of the damping
+  ParticleState start;   ///< after the first half of the drag of a medium
   ParticleState pose;
   ParticleState trial;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> bonded;
   std::vector<PairHessian> blocks;
   ContactPoints points;
   ContactTerm contact;
+  DampingTerm damping;
   StepHessian hessian;
   StepSolver solver;
   Eigen::VectorXd gradient;

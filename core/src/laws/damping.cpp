@@ -192,6 +192,23 @@ void apply_medium(const ParticleSet& set, const std::vector<MediumDamping>& medi
   }
 }
 
+void for_each_damping(const ParticleSet& set, const ParticleState& state, const Interactions& interactions, const PairHessianVisitor& visit) {
+  for (const Friction& law : interactions.friction) {
+    for (std::size_t bond = 0; bond < law.first.size(); ++bond) {
+      const std::uint32_t a = law.first[bond], b = law.second[bond];
+      // Of the slip and the relative spin: see `add_friction_loads`.
+      Eigen::Matrix<double, 6, 12> relative = Eigen::Matrix<double, 6, 12>::Zero();
+      const Mat3 arm = 0.5 * cross_matrix(state.position[b] - state.position[a]);
+      relative.block<3, 3>(0, 0) = relative.block<3, 3>(3, 3) = -Mat3::Identity();
+      relative.block<3, 3>(0, 6) = relative.block<3, 3>(3, 9) = Mat3::Identity();
+      relative.block<3, 3>(0, 3) = relative.block<3, 3>(0, 9) = arm;
+      visit(a, b, law.linear * relative.topRows<3>().transpose() * relative.topRows<3>() +
+                      law.angular * relative.bottomRows<3>().transpose() * relative.bottomRows<3>());
+    }
+  }
+  for_each_stiffness_damping(set, state, interactions, visit);
+}
+
 void add_friction_loads(const ParticleSet& set, const std::vector<Friction>& friction, const ParticleState& state,
                         Loads& loads) {
   for (const Friction& law : friction) {

@@ -1,6 +1,7 @@
 // Velocity-dependent loads of one half step: friction between particles and the drag of a medium.
 #pragma once
 
+#include "laws/pair_hessians.h"
 #include "supple/core/integrate.h"
 
 namespace supple::core {
@@ -39,6 +40,14 @@ void apply_medium(const ParticleSet& set, const std::vector<MediumDamping>& medi
 /// Stiffness damping of all pairs over dt, each pair implicitly as friction is, with its 12 x 12 stiffness. Allocates.
 void apply_stiffness_damping(const ParticleSet& set, const Interactions& interactions, double dt, PairOrder order,
                              ParticleState& state, Ledger& ledger);
+
+/// `for_each_damping` of stiffness damping alone.
+void for_each_stiffness_damping(const ParticleSet& set, const ParticleState& state, const Interactions& interactions,
+                                const PairHessianVisitor& visit);
+
+/// Calls visit(a, b, D) for every pair that friction or stiffness damping acts on: its loads on (dx_A, dtheta_A, dx_B, dtheta_B) are -D times its
+/// velocities. D is symmetric and positive semi-definite, and rigid motions of the pair have none.
+void for_each_damping(const ParticleSet& set, const ParticleState& state, const Interactions& interactions, const PairHessianVisitor& visit);
 
 /// The same as forces and torques at a state, for integrators without half steps; added to `loads`.
 void add_friction_loads(const ParticleSet& set, const std::vector<Friction>& friction, const ParticleState& state,

@@ -126,21 +126,27 @@ void apply_stiffness_damping(const ParticleSet& set, const Interactions& interac
   }
 }
 
-void add_stiffness_damping_loads(const ParticleSet& set, const Interactions& interactions, const ParticleState& state,
-                                 Loads& loads) {
+void for_each_stiffness_damping(const ParticleSet& set, const ParticleState& state, const Interactions& interactions,
+                                const PairHessianVisitor& visit) {
   if (interactions.stiffness_damping.empty()) return;
   for_each_hessian(set, state, interactions, HessianKind::PositiveSemiDefinite,
                    [&](std::uint32_t a, std::uint32_t b, const PairHessian& h) {
                      const double time = damping_time(set, interactions.stiffness_damping, a, b);
-                     if (time <= 0.0) return;
-                     const Vec3 r = state.position[b] - state.position[a];
-                     const Vec12 load = -time * deformation_stiffness(r, h) * velocities(set, state, a, b);
-                     const Balanced balanced = balance(r, load);
-                     loads.force[a] -= balanced.force_b;
-                     loads.force[b] += balanced.force_b;
-                     loads.torque[a] += balanced.torque_a;
-                     loads.torque[b] += balanced.torque_b;
+                     if (time > 0.0) visit(a, b, time * deformation_stiffness(state.position[b] - state.position[a], h));
                    });
+}
+
+void add_stiffness_damping_loads(const ParticleSet& set, const Interactions& interactions, const ParticleState& state,
+                                 Loads& loads) {
+  if (interactions.stiffness_damping.empty()) return;
+  for_each_stiffness_damping(set, state, interactions, [&](std::uint32_t a, std::uint32_t b, const PairHessian& d) {
+    const Vec3 r = state.position[b] - state.position[a];
+    const Balanced balanced = balance(r, -d * velocities(set, state, a, b));
+    loads.force[a] -= balanced.force_b;
+    loads.force[b] += balanced.force_b;
+    loads.torque[a] += balanced.torque_a;
+    loads.torque[b] += balanced.torque_b;
+  });
 }
 
 }  // namespace supple::core

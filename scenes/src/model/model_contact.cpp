@@ -61,8 +61,14 @@ std::uint32_t body_of(const Model& model, const std::string& name) {
 /// never faster than the faster of its two bodies against a rigid one. Where the normal passes the particle's centre at an arm
 /// r, which what extends beyond a ball allows, it turns, too: 1 / m + r^2 / I in place of 1 / m. Blows at the very end of a body
 /// are brief: they are let have twice the phase in a step.
-double contact_frequency(const ObjectModel& object, const core::ParticleSet& particles) {
-  double largest = 0.0;
+struct ContactSpring {
+  double stiffness = 0.0;     ///< [N/m]
+  double inverse_mass = 0.0;  ///< [1/kg]
+};
+
+/// Of every primitive.
+std::vector<ContactSpring> contact_springs(const ObjectModel& object, const core::ParticleSet& particles) {
+  std::vector<ContactSpring> springs;
   for (const implicit::Primitive& primitive : object.skeleton.primitive) {
     const double a = iso_radius(primitive, object.skeleton.iso);
     const double scale = implicit::distance_scale(primitive);
@@ -75,9 +81,25 @@ double contact_frequency(const ObjectModel& object, const core::ParticleSet& par
     const double arm = primitive.offset.position.norm() + (support - Vec3::Constant(least)).cwiseMax(0.0).norm();
     const double inverse_mass = 1.0 / particles.mass[carrier];
     const double turning = 0.25 * (inverse_mass + arm * arm / particles.inertia[carrier].minCoeff());
-    largest = std::max(largest, stiffness * std::max(inverse_mass, turning));
+    springs.push_back({stiffness, std::max(inverse_mass, turning)});
   }
+  return springs;
+}
+
+double contact_frequency(const ObjectModel& object, const core::ParticleSet& particles) {
+  double largest = 0.0;
+  for (const ContactSpring& spring : contact_springs(object, particles)) largest = std::max(largest, spring.stiffness * spring.inverse_mass);
   return std::sqrt(largest);
+}
+
+/// The stiffest of an object's contacts and the lightest that it moves, which need not be one.
+ContactSpring extreme_of(const ObjectModel& object, const core::ParticleSet& particles) {
+  ContactSpring out;
+  for (const ContactSpring& spring : contact_springs(object, particles)) {
+    out.stiffness = std::max(out.stiffness, spring.stiffness);
+    out.inverse_mass = std::max(out.inverse_mass, spring.inverse_mass);
+  }
+  return out;
 }
 
 /// The same of the springs of friction: half a dozen at a particle, at arms of its iso radius. Their damping counts as the
@@ -393,6 +415,28 @@ double dissipation_for(double restitution, double speed) {
   return 0.5 * (low + high) / speed;
 }
 
+double pair_contact_frequency(const Model& model) {
+  const auto count = static_cast<std::uint32_t>(model.objects.size());
+  std::vector<ContactSpring> spring(count);
+  for (std::uint32_t i = 0; i < count; ++i) spring[i] = extreme_of(model.objects[i], model.particles);
+  double square = 0.0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const ObjectModel& object = model.objects[i];
+    if (!object.collides) continue;
+    if (own_contacts(object) > 0) square = std::max(square, spring[i].stiffness * spring[i].inverse_mass);  // half the stiffness, twice the inverse mass
+    for (std::uint32_t j = i + 1; j < count + model.fixed.size(); ++j) {
+      if (model.rules.allowed && !model.rules.allowed(i, j)) continue;
+      if (j >= count) {
+        square = std::max(square, spring[i].stiffness * spring[i].inverse_mass);
+      } else if (model.objects[j].collides && spring[i].stiffness + spring[j].stiffness > 0.0) {
+        const double both = spring[i].stiffness * spring[j].stiffness / (spring[i].stiffness + spring[j].stiffness);
+        square = std::max(square, both * (spring[i].inverse_mass + spring[j].inverse_mass));
+      }
+    }
+  }
+  return std::min(model.contact_frequency, std::sqrt(square));
+}
+
 double largest_friction(const Model& model) {
   const std::size_t n = model.objects.size();
   const auto collides = [&](std::size_t i) { return i >= n || model.objects[i].collides; };
@@ -458,9 +502,9 @@ void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, Model
     }
     if (!touches) continue;
     model.largest_dissipation = std::max(model.largest_dissipation, object.material.dissipation);
-    model.contact_frequency = std::max(model.contact_frequency,
-                                       std::hypot(contact_frequency(object, model.particles),
-                                                  stick_frequency(object, model.particles, model.reaction.stick)));
+    // Springs of friction need not be accurate, but stable: steps of an accuracy let them have twice the phase.
+    const double sticks = (scene.accuracy ? 0.5 : 1.0) * stick_frequency(object, model.particles, model.reaction.stick);
+    model.contact_frequency = std::max(model.contact_frequency, std::hypot(contact_frequency(object, model.particles), sticks));
     if (!needs_samples) continue;
     double thinnest = object.iso_radius;  // obstacles have no samples: those of the object see the thinnest of their shapes
     for (const FixedBody& body : model.fixed) thinnest = std::min(thinnest, body.iso_radius);

@@ -22,6 +22,10 @@ namespace supple::scenes {
 /// Largest coefficient of friction between any two bodies that may touch; 0: none has any.
 [[nodiscard]] double largest_friction(const Model& model);
 
+/// Upper estimate of the angular frequency of all contacts that are possible, the compliances of both bodies in series [rad/s]; at most
+/// `Model::contact_frequency`, which takes every body as if it met a rigid one.
+[[nodiscard]] double pair_contact_frequency(const Model& model);
+
 /// @param budget  counts surface samples before they are made
 void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults);
 

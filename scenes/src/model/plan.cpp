@@ -216,7 +216,7 @@ class StepCounts {
   /// What implicit steps of an accuracy must follow: contacts, and the slowest waves through an object, of about half the frequency
   /// pair_frequency x length / size. What is faster hardly moves the object.
   [[nodiscard]] double resolved(double pair_frequency) const {
-    double frequency = model_.contact_frequency;
+    double frequency = pair_contact_frequency(model_);
     for (const ObjectModel& object : model_.objects) {
       if (object.separate || object.last - object.first < 2) continue;
       frequency = std::max(frequency, 0.5 * pair_frequency * model_.smallest_length / size_of(object));
@@ -236,6 +236,12 @@ class StepCounts {
     const double gravity = scene_.gravity.norm(), speed = std::max(speeds_.linear, std::sqrt(gravity * size));
     const double blur = kPart * friction * (gravity + model_.contact_frequency * speed);  // of v, by dt [m/s^2]
     return of_step(blur > 0.0 ? accuracy * size / (blur * scene_.duration) : frame_);
+  }
+
+  /// Half steps of damping must be shorter than what is damped fastest takes to stop.
+  [[nodiscard]] double to_resolve_damping(double rate, double accuracy) const {
+    constexpr double kPart = 1.0;  // of 1 / rate, at the coarsest accuracy
+    return of_step(rate > 0.0 ? kPart * std::sqrt(accuracy / kDefaultAccuracy) / rate : frame_);
   }
 
  private:
@@ -278,15 +284,17 @@ void choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts
   const double accuracy = *scene.accuracy;
   const AccuracyRules rules = accuracy_rules(accuracy);
   const double stable = counts.of(std::hypot(plan.pair_frequency, model.contact_frequency), rules.explicit_steps);
-  const double friction = counts.to_resolve_friction(accuracy), explicit_steps = std::max(stable, friction);
+  const double friction = counts.to_resolve_friction(accuracy), damping = counts.to_resolve_damping(plan.damping_rate, accuracy);
+  const double explicit_steps = std::max({stable, friction, damping});
   const double implicit_steps = counts.of(counts.resolved(plan.pair_frequency), rules.implicit_steps);
-  // Where no friction limits explicit steps, what does are vibrations, whose phase implicit ones would lose: they must be far stiffer than all else.
-  const int cost = friction > stable ? kImplicitStepCost : kImplicitCost;
+  const bool dissipates = explicit_steps > stable, touches = model.contact_frequency > 0.0;
+  const double cost = !dissipates ? kImplicitCost : touches ? kImplicitStepCost : implicit_pair_cost(model.particles.size());
   const bool implicit = suits_implicit(model) && explicit_steps > cost * implicit_steps;
   plan.settings.method = implicit ? core::Integrator::ImplicitMidpoint : core::Integrator::Symplectic;
   plan.reason = std::string(implicit ? "implicit_midpoint" : "symplectic") + ": accuracy " + number_text(accuracy) + " takes " +
                 number_text(implicit_steps) + " implicit steps per frame, or " + number_text(explicit_steps) + " of velocity Verlet" +
-                (friction > stable ? ", to resolve friction" : "") + "; an implicit step costs as much as " + std::to_string(cost);
+                (!dissipates ? "" : friction < damping ? ", to resolve damping between particles" : ", to resolve friction") +
+                "; an implicit step costs as much as " + number_text(std::round(cost));
 }
 
 /// The method `implicit`.
@@ -312,7 +320,7 @@ void set_limits(const Scene& scene, const Model& model, const StepCounts& counts
   const bool resolves = scene.accuracy || scene.integrator.method == MethodName::Implicit;
   plan.limiting_frequency = !implicit ? all : !plan.chosen ? 0.0 : resolves ? counts.resolved(plan.pair_frequency) : model.contact_frequency;
   if (!implicit && scene.accuracy && plan.chosen) {
-    const double steps = counts.to_resolve_friction(*scene.accuracy);
+    const double steps = std::max(counts.to_resolve_friction(*scene.accuracy), counts.to_resolve_damping(plan.damping_rate, *scene.accuracy));
     if (std::isfinite(steps)) plan.limiting_frequency = std::max(all, plan.bounds.phase * steps / counts.frame());
   }
   if (plan.settings.method == core::Integrator::Adaptive) {
@@ -329,6 +337,7 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   const StepCounts counts(scene, model);
   IntegratorPlan plan;
   plan.pair_frequency = core::largest_frequency(model.particles, model.rest, model.interactions);
+  plan.damping_rate = core::largest_damping_rate(model.particles, model.rest, model.interactions);
   plan.settings.rotation = scene.integrator.rotation == RotationName::Splitting ? core::RotationUpdate::Splitting
                                                                                : core::RotationUpdate::Exponential;
   plan.settings.length = model.smallest_length;
@@ -359,6 +368,11 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   if (scene.accuracy) plan.slow_slip = rules.slow_slip;
   set_limits(scene, model, counts, plan);
   return plan;
+}
+
+double implicit_pair_cost(std::size_t particles) {
+  constexpr double kOfTen = 32.0, kGrowth = 2.0 / 3.0;
+  return kOfTen * std::pow(std::max(1.0, static_cast<double>(particles) / 10.0), kGrowth);
 }
 
 double stick_speed(const Scene& scene, const Model& model) {

@@ -161,35 +161,20 @@ void Simulation::Impl::begin_step() {
 
 /// Stages 1 to 8 for what is awake.
 void Simulation::Impl::integrate() {
-  // Velocity Verlet observes this by itself; an adaptive integrator chooses steps of its own inside this one.
-  const core::Integrator method = integrator.settings.method;
-  const bool whole = method != core::Integrator::Symplectic && method != core::Integrator::Adaptive;
-  awake_laws.load_span = whole ? std::array{time(), time() + dt()} : std::array<double, 2>{};
-  const core::ForceModel forces = [this](const core::ParticleState& at_state, double at, core::ForceSample& out) {
-    evaluate_forces(at_state, at, out);
-  };
-  core::ImplicitContact contact = implicit_contact();
-  const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr},
-                                                time(), dt(), {state.particles, state.kick, state.ledger},
-                                                {executor, workspace, integrator_workspace});
-  if (contact.find) take_contact_loads(contact.load);
-  book_work(report);
+  const bool implicit = core::is_implicit(integrator.settings.method);
+  if (implicit && fixes_step(scene) && contact_on()) {
+    advance_divided(time(), dt(), core::halvings(scene.time_step.max_substeps, 1 << state.halvings));
+  } else {
+    advance_particles(time(), dt());
+    if (implicit) {
+      friction.look(context(), frame);
+      book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
+    }
+  }
   StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
   ++p.calls;
   for (const std::uint32_t i : awake) p.visited += bodies[i].origin.is_group() ? 0 : bodies[i].particle.size();
   p.present += particles.size();
-}
-
-/// What an implicit step found of each pair of bodies in contact.
-void Simulation::Impl::take_contact_loads(std::span<const core::ContactPairLoad> loads) {
-  frame.pair_power.resize(loads.size());
-  frame.friction_speed.resize(loads.size());
-  for (std::size_t k = 0; k < loads.size(); ++k) {
-    frame.pair_power[k] = loads[k].dissipated / dt();
-    const double friction_of_pair = collision::material_of(frame.bodies, rules, frame.surface.summary[k].bodies).friction;
-    frame.friction_speed[k] = friction_of_pair > 0.0 ? loads[k].stick_speed : 0.0;
-  }
-  friction.look(context(), frame);
 }
 
 /// Throws, with the last frame as the state, where particles are farther or faster than any of the scene can be.
@@ -204,10 +189,71 @@ void Simulation::Impl::check_divergence() {
   throw_diverged(divergence, step, at);
 }
 
+/// Implicit steps have booked their contacts themselves.
 void Simulation::Impl::book_contacts() {
-  if (!awake.empty()) book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
-  const bool ends_frame = state.substep == (1 << state.halvings);
-  if (ends_frame && !core::is_implicit(integrator.settings.method) && contact_on()) friction.look(context(), frame);
+  if (awake.empty() || core::is_implicit(integrator.settings.method)) return;
+  book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
+  if (state.substep == (1 << state.halvings) && contact_on()) friction.look(context(), frame);
+}
+
+/// One call of the integrator. Implicit methods book what contacts dissipate.
+void Simulation::Impl::advance_particles(double begin, double h) {
+  // Velocity Verlet observes this by itself; an adaptive integrator chooses steps of its own inside this one.
+  const core::Integrator method = integrator.settings.method;
+  const bool whole = method != core::Integrator::Symplectic && method != core::Integrator::Adaptive;
+  awake_laws.load_span = whole ? std::array{begin, begin + h} : std::array<double, 2>{};
+  const core::ForceModel forces = [this](const core::ParticleState& at_state, double at, core::ForceSample& out) {
+    evaluate_forces(at_state, at, out);
+  };
+  core::ImplicitContact contact = implicit_contact();
+  const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr}, begin, h,
+                                                {state.particles, state.kick, state.ledger}, {executor, workspace, integrator_workspace});
+  book_work(report);
+  if (!core::is_implicit(method)) return;
+  frame.pair_power.resize(contact.load.size());
+  frame.friction_speed.resize(contact.load.size());
+  for (std::size_t k = 0; k < contact.load.size(); ++k) {
+    frame.pair_power[k] = contact.load[k].dissipated / h;
+    const double friction_of_pair = collision::material_of(frame.bodies, rules, frame.surface.summary[k].bodies).friction;
+    frame.friction_speed[k] = friction_of_pair > 0.0 ? contact.load[k].stick_speed : 0.0;
+  }
+}
+
+/// Whether a step from `before` and `ledger` to the present state gave the scene energy: its contacts were not those that it was made with.
+bool Simulation::Impl::creates_energy(const Energies& before, const core::Ledger& ledger, const Energies& now) const {
+  constexpr double kShare = 0.1;  // of the energy that takes part
+  if (!energies_balance()) return false;
+  const double given = state.ledger.external_work - ledger.external_work, lost = state.ledger.dissipated - ledger.dissipated;
+  const double part = before.kinetic + before.contact + std::abs(given);
+  return now.total() - before.total() - given + lost > kShare * part + 1e-9 * std::abs(before.total());
+}
+
+/// An implicit step that the scene fixes. Contact is found once in a step, at a predicted pose: where bodies pass each other within it, or contact there
+/// gives them energy, it is made as two steps of half its size, and so on. @param halvings  how often at most
+/// @throws Error{Diverged} where that is not enough
+void Simulation::Impl::advance_divided(double begin, double h, int halvings) {
+  const State before = state;
+  const Energies energy = energies_within(begin);
+  advance_particles(begin, h);
+  Profile unused{};
+  StageContext quiet = quiet_context(unused);
+  quiet.time = begin + h;
+  const TakenStep step{.before = before.particles, .after = state.particles, .end = begin + h, .size = h};
+  const Energies now = energies_within(begin + h);
+  const auto missed = find_missed_contact(quiet, step, state.samples, pulled, pulled);
+  if (missed && halvings == 0) throw_too_coarse(*missed);
+  if (halvings > 0 && (missed || creates_energy(energy, before.ledger, now))) {
+    if (!divided_noted) {
+      divided_noted = true;
+      warnings.push_back("time_step.substeps: steps of " + short_text(h) + " s pass contacts; those that do are divided (first at frame " +
+                         std::to_string(state.frame) + ')');
+    }
+    state = before;
+    advance_divided(begin, 0.5 * h, halvings - 1);
+    return advance_divided(begin + 0.5 * h, 0.5 * h, halvings - 1);
+  }
+  friction.look(context(), frame);
+  book_pair_work(frame.surface.summary, frame.pair_power, h, state.record);
 }
 
 /// Substeps stay on the grid of the frame.

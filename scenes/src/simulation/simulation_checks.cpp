@@ -26,7 +26,8 @@ void Simulation::Impl::note_coarse_steps() {
 
 /// After a fixed step: checks for contact that it missed, or that created energy. @throws Error{Diverged}
 void Simulation::Impl::check_fixed_step() {
-  if (!fixes_step(scene) || awake.empty() || !contact_on()) return;
+  // Implicit steps are checked, and divided, where they are made.
+  if (!fixes_step(scene) || awake.empty() || !contact_on() || core::is_implicit(integrator.settings.method)) return;
   Profile unused{};
   const StageContext quiet = quiet_context(unused);
   const TakenStep step{.before = step_begin, .after = state.particles, .end = time(), .size = dt()};

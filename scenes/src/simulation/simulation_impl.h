@@ -63,6 +63,7 @@ struct Simulation::Impl {
   SearchCounts searches;      ///< of the meshes of this state,
   SearchCounts all_searches;  ///< and of all so far
   bool coarse_noted = false;  ///< in the warnings
+  bool divided_noted = false;
   std::optional<double> created_before;  ///< energy unaccounted for where stepping began; none: not looked at yet [J]
 
   // Steps.
@@ -73,7 +74,9 @@ struct Simulation::Impl {
   void begin_step();
   void refine_step();
   void integrate();
-  void take_contact_loads(std::span<const core::ContactPairLoad> loads);
+  void advance_particles(double begin, double h);
+  void advance_divided(double begin, double h, int halvings);
+  [[nodiscard]] bool creates_energy(const Energies& before, const core::Ledger& ledger, const Energies& now) const;
   void book_contacts();
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out);
   core::ImplicitContact implicit_contact();
@@ -138,6 +141,8 @@ struct Simulation::Impl {
   const std::vector<Mesh>& pull_meshes();
   double contact_energy();
   Energies energies();
+  /// Of the state within a step, at a time of it; leaves the contacts there in `pulled`. Without springs of friction, which implicit steps do not have.
+  Energies energies_within(double at);
   void book_audits();
 };
 

@@ -120,6 +120,18 @@ Energies Simulation::Impl::energies() {
   return e;
 }
 
+Energies Simulation::Impl::energies_within(double at) {
+  Profile unused{};
+  StageContext quiet = quiet_context(unused);
+  quiet.time = at;
+  std::vector<implicit::SampleState> trial = state.samples;
+  find_contact_surface(quiet, state.particles, trial, pulled, true);
+  Energies e{.kinetic = core::measure_motion(model.particles, state.particles).kinetic_energy,
+             .interaction = core::potential_energy(model.particles, state.particles, laws)};
+  for (const auto& s : pulled.surface.summary) e.contact += s.energy;
+  return e;
+}
+
 void Simulation::Impl::book_audits() {
   const double energy = energies().total();  // and the contacts
   scenes::book_audits(model, bodies, energy, pulled.surface, state);

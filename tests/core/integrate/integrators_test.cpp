@@ -594,6 +594,88 @@ TEST(ImplicitMidpoint, KeepsMomentumAndAngularMomentum) {
   }
 }
 
+/// A spiral at rest whose friction stops rotations far faster than they begin; its ends are pulled apart.
+System make_sluggish_spiral(const Method& method) {
+  System s = make_spiral(method);
+  for (std::size_t i = 0; i < s.p.set.size(); ++i) {
+    s.p.state.velocity[i] = Vec3::Zero();
+    s.p.state.angular_momentum[i] = Vec3::Zero();
+    s.p.set.inertia[i] = Vec3::Constant(1e-4);
+  }
+  Friction friction;
+  friction.linear = 0.5;
+  friction.angular = 1.0;
+  for (std::uint32_t i = 0; i + 1 < s.p.set.size(); ++i) {
+    friction.first.push_back(i);
+    friction.second.push_back(i + 1);
+  }
+  s.interactions.friction.push_back(friction);
+  return s;
+}
+
+/// Where the last particle of a sluggish spiral is after 0.4 s of a force on it.
+Vec3 end_of_pulled_spiral(const Method& method, double dt) {
+  System s = make_sluggish_spiral(method);
+  InteractionWorkspace pairs(s.p.set, s.interactions);
+  const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
+    accumulate_interactions(s.p.set, state, s.interactions, t, Executor(1), pairs, out.internal, out.external);
+    out.external.force[0] = Vec3(0, -2, -1);
+    out.external.force[s.p.set.size() - 1] = Vec3(0, 2, 1);
+  };
+  s.run(forces, dt, static_cast<int>(std::lround(0.4 / dt)));
+  return s.p.state.position.back();
+}
+
+TEST(ImplicitMidpoint, FollowsMotionThatIsDampedFasterThanAStep) {
+  EXPECT_GT(0.01 * largest_damping_rate(test::make_spiral().set, make_sluggish_spiral(kMidpoint).p.state, make_sluggish_spiral(kMidpoint).interactions), 100.0);
+  const Vec3 fine = end_of_pulled_spiral(kMidpoint, 6.25e-4), start = test::make_spiral().state.position.back();
+  const double way = (fine - start).norm();
+  EXPECT_GT(way, 0.01);
+  EXPECT_LT((end_of_pulled_spiral(kMidpoint, 0.01) - fine).norm(), 0.02 * way);
+  // Explicit half steps of damping reach the same end, with far shorter steps: the two methods share no damping.
+  EXPECT_LT((end_of_pulled_spiral(kSplitting, 1e-5) - fine).norm(), 0.02 * way);
+  EXPECT_GT((end_of_pulled_spiral(kSplitting, 2e-3) - fine).norm(), 0.2 * way);
+}
+
+TEST(ImplicitMidpoint, IsOfSecondOrderWithDamping) {
+  const auto pose = [](double dt) {
+    System s = make_spiral(kMidpoint);
+    s.interactions.friction = make_sluggish_spiral(kMidpoint).interactions.friction;
+    s.interactions.friction[0].linear = 0.05;
+    s.interactions.friction[0].angular = 1e-4;
+    s.interactions.stiffness_damping.push_back({.object = 0, .time = 1e-3});
+    s.settings.tolerance = 1e-11;
+    s.run_until(0.1, dt);
+    return s.p.state.position.back();
+  };
+  const Vec3 exact = pose(7.8125e-5);
+  EXPECT_NEAR(order_of((pose(1.25e-3) - exact).norm(), (pose(6.25e-4) - exact).norm()), 2.0, 0.25);
+}
+
+TEST_P(ImplicitMethod, LosesTheEnergyThatDampingBooksAndNoMomentum) {
+  System s = make_spiral(GetParam());
+  s.interactions.friction = make_sluggish_spiral(GetParam()).interactions.friction;
+  s.interactions.stiffness_damping.push_back({.object = 0, .time = 5e-3});
+  s.settings.tolerance = 1e-10;
+  const Motion start = measure_motion(s.p.set, s.p.state);
+  double energy = s.energy(), dissipated = 0.0;
+  for (int k = 0; k < 100; ++k) {
+    s.run(4e-3, 1);
+    const Motion now = measure_motion(s.p.set, s.p.state);
+    ASSERT_LE((now.momentum - start.momentum).norm(), 1e-12 * start.momentum_scale) << k;
+    if (GetParam().method == Integrator::ImplicitMidpoint) {  // the other one keeps no angular momentum
+      ASSERT_LE((now.angular_momentum - start.angular_momentum).norm(), 1e-8 * start.angular_momentum_scale) << k;
+    }
+    ASSERT_LE(s.energy(), energy * (1.0 + 1e-6)) << k;
+    ASSERT_GE(s.ledger.dissipated, dissipated) << k;
+    energy = s.energy();
+    dissipated = s.ledger.dissipated;
+  }
+  if (GetParam().method == Integrator::ImplicitMidpoint) {
+    EXPECT_LT(std::abs(s.imbalance(make_spiral(kMidpoint).energy())), 0.02 * dissipated);
+  }
+}
+
 TEST(ImplicitMidpoint, SpinsUpExactlyUnderAConstantTorque) {
   System s;
   choose(kMidpoint, s);

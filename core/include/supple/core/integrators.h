@@ -10,7 +10,8 @@
 /// | ImplicitMidpoint | 2     | none           | momentum, angular momentum; quadratic energies                      |
 ///
 /// Omega is the largest angular frequency [rad/s]. Damping enters the Runge-Kutta methods as forces, so that their order
-/// holds, and the others by exact or implicit half steps (integrate.h).
+/// holds; Symplectic takes implicit half steps of it (integrate.h). The implicit methods minimise friction between particles and stiffness damping with
+/// the rest, and take exact half steps of the drag of a medium.
 ///
 /// Backward Euler takes the pose that minimises the incremental potential (e.g. Martin et al. 2011, eq. 4)
 ///   Pi = 1/(2 h^2) sum_i (m |x - x~|^2 + delta^T I delta) + U(x, q),   delta = log(q~^-1 q) in body axes,
@@ -79,6 +80,10 @@ struct StepTools {
   InteractionWorkspace& pairs;
   IntegratorWorkspace& workspace;
 };
+
+/// About the fastest rate at which friction between particles and stiffness damping take velocities of a pair [1/s]. Methods with half steps of damping
+/// relax what is damped faster than dt at a rate of their own; the implicit ones do not.
+[[nodiscard]] double largest_damping_rate(const ParticleSet& set, const ParticleState& rest, const Interactions& interactions);
 
 /// One step of size dt by the chosen method. Books work, dissipation and impulses to the ledger by the quadrature of the
 /// method. The next trial substep of `Adaptive` is kept in `kick`, so that a run continues with the same bits.

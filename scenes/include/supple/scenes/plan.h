@@ -83,6 +83,7 @@ struct StepPlan {
 struct IntegratorPlan {
   core::IntegratorSettings settings;
   double pair_frequency = 0.0;  ///< largest of the pair laws about rest [rad/s]
+  double damping_rate = 0.0;    ///< largest of friction between particles and stiffness damping, about rest [1/s]
   bool chosen = false;          ///< chosen by the cost model: `integrator.method` is auto and the scene does not fix the step
   std::string reason;
   /// Frequency that limits the step [rad/s]. The adaptive method finds its own; implicit methods need none, but one chosen by `auto` resolves contact.
@@ -93,9 +94,10 @@ struct IntegratorPlan {
 
 /// `auto` chooses velocity Verlet unless a frame needs more of its steps than `time_step.max_substeps`, or more by
 /// kImplicitCost than of backward Euler at its own limits: a count of steps, never a clock.
-/// With `accuracy` it chooses velocity Verlet or implicit midpoint, whichever reaches it at less cost, a step of the latter counted as
-/// kImplicitStepCost of the former where its steps must be short to resolve friction, which they blur below a speed that grows with the step,
-/// and otherwise as kImplicitCost. The method
+/// With `accuracy` it chooses velocity Verlet or implicit midpoint, whichever reaches it at less cost. Explicit steps must be short for stability, for
+/// friction, which they blur below a speed that grows with the step, and for the damping of pairs, whose half steps let what is damped faster than a step
+/// relax too fast. A step of implicit midpoint counts as kImplicitStepCost explicit ones where bodies touch and as `implicit_pair_cost` elsewhere; where
+/// stability limits explicit steps, what does are vibrations, whose phase implicit ones would lose, and it counts as kImplicitCost. The method
 /// `implicit` is implicit midpoint in steps that resolve contact: of second order, it needs an eighth of the steps of backward Euler for the
 /// same error. Where the scene fixes steps that are longer than contacts last, it is backward Euler, which is stable there.
 [[nodiscard]] IntegratorPlan plan_integrator(const Scene& scene, const Model& model);
@@ -110,6 +112,9 @@ inline constexpr int kImplicitCost = 1024;
 
 /// The same of implicit midpoint at the tolerance of an accuracy: 9 to 11 for a jelly of 64 particles that tumbles down stairs.
 inline constexpr int kImplicitStepCost = 10;
+
+/// The same without contact, 32 for a spiral of ten particles; it grows with their number as a step of backward Euler does.
+[[nodiscard]] double implicit_pair_cost(std::size_t particles);
 
 /// The limits of a step for particles of these speeds [m/s], [rad/s]; gravity adds its speed of one frame.
 [[nodiscard]] core::StepLimits step_limits(const Scene& scene, const Model& model, double frequency,
