@@ -65,7 +65,9 @@ TEST(DryRun, CountsWhatTheRunMakes) {
 }
 
 TEST(DryRun, CountsTheFramesAskedFor) {
-  const Scene scene = parse_scene(std::string(small::kTwoDrops) + "duration: 1 s\n", "drops.yaml", ".");
+  std::string text = small::kTwoDrops;
+  text.append("duration: 1 s\n");
+  const Scene scene = parse_scene(text, "drops.yaml", ".");
   const RunEstimate estimate = estimate_run(scene, {.folder = {}, .frames = {1, 2, 3}});
   EXPECT_EQ(estimate.frames, 3);
 }
