@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -62,10 +63,17 @@ void fields(Archive& archive, ParticlesDesc& d) {
                   "expected more than inner_radius = " + number_text(d.inner_radius) + " [m]", number_text(d.outer_radius),
                   "");
   }
-  if (d.arrange == Ball || d.arrange == Tube) {
-    const double across = 2.0 * d.radius / d.spacing, along = d.arrange == Tube ? d.length / d.spacing : across;
-    archive.check(!(d.spacing > 0.0) || 4.0 * across * std::max(along, 1.0) * (d.arrange == Ball ? across : 1.0) <= 8.0 * kMostCount, "spacing",
-                  "expected at most 1000000 particles", "more", "enlarge it");
+  if (d.spacing > 0.0 && (d.arrange == Ball || d.arrange == Tube)) {
+    const double across = 2.0 * d.radius / d.spacing;
+    const double all = std::numbers::pi * (d.arrange == Ball ? across * across * across / 6.0 : across * (d.length / d.spacing + 1.0));
+    archive.check(all <= kMostCount, "spacing", "expected at most 1000000 particles", "about " + short_text(all), "enlarge it");
+  }
+  if (d.spacing > 0.0 && d.arrange == Scatter) {
+    constexpr double kMostScattered = 1e5, kMostFilled = 0.3;  // random places for more become rare
+    const double filled = d.count * std::numbers::pi / 6.0 * d.spacing * d.spacing * d.spacing / (d.size + Vec3::Constant(d.spacing)).prod();
+    archive.check(d.count <= kMostScattered, "count", "expected at most 100000 scattered particles", std::to_string(d.count), "");
+    archive.check(filled <= kMostFilled, "count", "expected balls of diameter 'spacing' to fill at most 0.3 of the box", short_text(filled) + " of it",
+                  "reduce 'count' or 'spacing', or enlarge 'size'");
   }
   if (d.arrange == Curve) archive.check(d.count >= 2, "count", "expected a whole number >= 2 for a curve", std::to_string(d.count), "");
   if (d.arrange == Grid) {

@@ -27,8 +27,9 @@ core::Arrangement fill_mesh(const Scene& scene, const ParticlesDesc& d, const st
   const implicit::MeshSolid solid(*read, {.slope = 1.0, .pose = {}});
   const Box box = solid.surface_box();
   const Vec3 middle = 0.5 * (box.lower + box.upper), reach = (0.5 * box.extent() / d.spacing).array().floor();
-  if (8.0 * (reach + Vec3::Constant(0.5)).prod() > 8.0 * kMostCount) {
-    faults.add(key + ".spacing", "expected at most " + number_text(8.0 * kMostCount) + " points of a lattice around the mesh", "more", "enlarge it");
+  constexpr double kMostPoints = 2.0 * kMostCount;  // around the mesh
+  if (const double points = (2.0 * reach + Vec3::Ones()).prod(); points > kMostPoints) {
+    faults.add(key + ".spacing", "expected at most " + number_text(kMostPoints) + " points of a lattice around the mesh", short_text(points), "enlarge it");
     return out;
   }
   std::vector<Vec3> row;

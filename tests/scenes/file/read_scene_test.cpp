@@ -81,7 +81,7 @@ TEST(SceneReader, ReadsASceneLikeASentence) {
   EXPECT_EQ(spiral.particles.arrange, ArrangeKind::Spiral);
   EXPECT_EQ(spiral.particles.count, 10);
   EXPECT_DOUBLE_EQ(spiral.particles.outer_radius, 0.55);
-  EXPECT_DOUBLE_EQ(spiral.particles.mass, 0.02);
+  EXPECT_DOUBLE_EQ(spiral.particles.mass.value(), 0.02);
   EXPECT_EQ(spiral.particles.normal, NormalKind::Radial);
   ASSERT_EQ(spiral.interactions.size(), 3u);
   EXPECT_EQ(spiral.interactions[0].law, LawKind::BondFrame);
@@ -109,7 +109,7 @@ TEST(SceneReader, ReadsJsonToo) {
 }
 
 TEST(SceneReader, ConvertsUnits) {
-  const auto mass = [](const std::string& text) { return parse(object_with("mass: " + text)).objects[0].particles.mass; };
+  const auto mass = [](const std::string& text) { return parse(object_with("mass: " + text)).objects[0].particles.mass.value(); };
   EXPECT_DOUBLE_EQ(mass("10 g"), 0.01);
   EXPECT_DOUBLE_EQ(mass("\"10g\""), 0.01);
   EXPECT_DOUBLE_EQ(mass("2 t"), 2000.0);

@@ -137,7 +137,8 @@ TEST(Model, RefusesScenesMadeByHandThatNoFileCouldAskFor) {
   const Scene scene = parse_scene(std::string(kHead) + kBall, "test.yaml", "");
   for (const double wrong : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
     Scene rate = scene, duration = scene, mass = scene;
-    rate.frame_rate = duration.duration = mass.objects[0].particles.mass = wrong;
+    rate.frame_rate = duration.duration = wrong;
+    mass.objects[0].particles.mass = wrong;
     for (const Scene* s : {&rate, &duration, &mass}) EXPECT_THROW((void)build_model(*s), ContractViolation) << wrong;
   }
 }
