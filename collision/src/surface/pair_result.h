@@ -2,10 +2,19 @@
 /// What one pair gives, before pairs are joined in their order.
 #pragma once
 
+#include <span>
+
 #include "supple/collision/contact_surface.h"
 #include "surface/patch_points.h"
 
 namespace supple::collision {
+
+/// What one patch adds to a pair.
+struct PatchShare {
+  Vec3 force = Vec3::Zero(), first = Vec3::Zero();  ///< first moment of its load about the world's origin
+  double load = 0.0, area = 0.0;
+  double estimate = 0.0;  ///< as ContactSurface::Summary::error_estimate has it, of the patch alone
+};
 
 struct PairResult {
   ContactSurface::Summary summary;
@@ -32,5 +41,8 @@ struct PairResult {
     load += sums.load;
   }
 };
+
+/// Forces of patches may cancel, and each is a lever to the centre of pressure: both are then off by more than any of the patches is.
+[[nodiscard]] double estimate_of_all(std::span<const PatchShare> patches, const PairResult& all);
 
 }  // namespace supple::collision

@@ -40,6 +40,14 @@ bool meets(const PairResult& result, double error) {
   return result.rounding > kLostInRounding || result.summary.error_estimate <= std::max({kSlack * error, kRound, kOfRounding * result.rounding});
 }
 
+/// Of the forces and areas of two results, as in ContactSettings::error.
+double difference_of(const PairResult& one, const PairResult& other) {
+  if (!(one.load > 0.0)) return other.load > 0.0 ? 1.0 : 0.0;
+  const double force = (one.summary.force - other.summary.force).norm() / force_scale(one.summary.force, one.load);
+  const double area = std::abs(one.summary.area - other.summary.area) / one.summary.area;
+  return std::max(force, area);
+}
+
 }  // namespace
 
 void Partners::build(std::size_t bodies, std::span<const BodyPair> pairs) {
@@ -135,11 +143,44 @@ PairSolver::Pressing PairSolver::thirds_press(const Job& job, const PairResult& 
   return std::find(taken_.begin(), taken_.end(), 0) == taken_.end() ? Pressing::All : Pressing::Some;
 }
 
+/// Polar patches again, cut where `third_bodies_` press harder. A star tells more of where they do, but is slow where its rays touch a small imprint or a
+/// face has corners: there patches are parted about the imprints themselves, which a star that is not as fine has to confirm.
+/// @return false where neither fits, or they contradict each other
+bool PairSolver::polar_cut(const Job& job, PairResult& out) {
+  if (job.a.pose.size() > 1 || job.b.pose.size() > 1) return false;  // their squeezed regions are not cut that exactly
+  constexpr double kFinestStar = 1e-4, kSafety = 3.0;
+  constexpr double kSmall = 0.05;  // of the area of the patches: a star tells imprints that take less from each other by few of its rays
+  const double whole = out.summary.area;
+  const std::span<const PolarCover> covers = patches_.covers();
+  const bool faces = std::any_of(covers.begin(), covers.end(), [](const PolarCover& cover) { return cover.frame.flat; });
+  if (faces) return imprints_cut(job, out);
+  const double error = job.settings().error;
+  const bool star = stars_cut(job, std::max(error, kFinestStar), out), coarse = error >= kFinestStar;
+  const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
+  if (star && coarse && !small && (out.points.point.empty() || meets(out, error))) return true;
+  std::swap(kept_, out);
+  out.summary.bodies = job.pair;
+  if (!imprints_cut(job, out)) return false;
+  if (!star || small) return true;
+  const double off = difference_of(kept_, out);
+  if (coarse) out.summary.error_estimate = std::max(out.summary.error_estimate, off);
+  return coarse || off <= kSafety * (kept_.summary.error_estimate + out.summary.error_estimate);
+}
+
 /// The third bodies that reach the overlap.
 void PairSolver::take_all_thirds(const Job& job) {
   third_bodies_.clear();
   for (const ContactBody& third : thirds_.all()) {
     if (third.field.bound(job.overlap).upper > 0.0) third_bodies_.push_back(&third);
+  }
+}
+
+/// Third bodies as what bounds panels. @param taken  of them
+void PairSolver::take_third_levels(const Job& job, std::span<const ContactBody* const> taken) {
+  third_levels_.clear();
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    const ContactBody* const third = &thirds_.all()[t];
+    if (std::find(taken.begin(), taken.end(), third) != taken.end()) third_levels_.push_back({third, third_[t] > job.pair.b});
   }
 }
 
@@ -188,8 +229,8 @@ bool PairSolver::polar(const Job& job, PairResult& out) {
   return rings(job.polar, job.overlap, job.convex, out);
 }
 
-/// Polar patches again, cut where `third_bodies_` press harder. @return false where the rule does not fit
-bool PairSolver::polar_cut(const Job& job, PairResult& out) {
+/// Polar patches again, parted about their imprints, and cut where `third_bodies_` press harder. @return false where the rule does not fit
+bool PairSolver::imprints_cut(const Job& job, PairResult& out) {
   out.clear();
   PolarJob cut = job.polar;
   cut.third = third_bodies_;
@@ -197,6 +238,37 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   if (out.points.point.empty()) return true;  // all of it lies in a third body
   out.summary.rule = ContactRule::Polar;
   out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
+  return true;
+}
+
+/// The same by panels of a star. @return false where they do not fit
+bool PairSolver::stars_cut(const Job& job, double asked, PairResult& out) {
+  constexpr double kFiner = 0.5;  // several patches are off by more than each of them
+  out.clear();
+  PairPressure& pressure = job.polar.pressure;
+  share_.clear();
+  take_third_levels(job, third_bodies_);
+  const std::span<const PolarCover> covers = patches_.covers();
+  const double error = covers.size() > 1 ? kFiner * asked : asked;
+  for (const PolarCover& cover : covers) {
+    imprints_.clear();
+    for (std::size_t t = 0; t < third_levels_.size(); ++t) {
+      if (const std::optional<Vec3> at = imprint_.find(pressure, cover, *third_levels_[t].body, 0.0)) imprints_.push_back({*at, t});
+    }
+    PanelOutcome outcome;
+    const Vec3& origin = cover.frame.origin;
+    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, job.polar.regions, origin, job.settings().energy, false, &cover, imprints_, third_bodies_}, panel_room_, out.points, outcome)) return false;
+    const PatchSums& sums = outcome.sums;
+    out.add(sums, origin);
+    share_.push_back({sums.force, sums.first + sums.load * origin, sums.load, sums.area, outcome.estimate});
+    if (outcome.largest <= out.summary.largest_pressure) continue;
+    out.summary.largest_pressure = outcome.largest;
+    out.summary.largest_overlap = outcome.thickness;
+  }
+  out.summary.patches = static_cast<std::uint32_t>(covers.size());
+  if (out.points.point.empty()) return true;  // all of it lies in a third body
+  out.summary.rule = ContactRule::Polar;
+  out.summary.error_estimate = std::min(1.0, estimate_of_all(share_, out));
   return true;
 }
 
@@ -265,7 +337,6 @@ struct PanelRule {
 
 bool PairSolver::panels(const Job& job, PairResult& out) {
   if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return false;
-  const BodyPair pair = out.summary.bodies;
   PairPressure& pressure = job.polar.pressure;
   std::vector<Vec3> starts(job.seeds.begin(), job.seeds.end());
   if (starts.empty()) {
@@ -274,11 +345,7 @@ bool PairSolver::panels(const Job& job, PairResult& out) {
   }
   PanelRule rule;
   return solve_in_order(job, rule, ContactRule::Panels, [&](const Regions& regions, const Vec3& reference) {
-    third_levels_.clear();
-    for (std::size_t t = 0; t < third_.size(); ++t) {
-      const ContactBody& third = thirds_.all()[t];
-      if (third.field.bound(job.overlap).upper > 0.0) third_levels_.push_back({&third, third_[t] > pair.b});
-    }
+    take_third_levels(job, third_bodies_);
     const bool fits = solve_by_panels({pressure, third_levels_, job.overlap, starts, job.settings().error, regions, reference, job.settings().energy, job.settings().only == ContactRule::None}, panel_room_, out.points, rule.outcome);
     for (const std::size_t side : {0u, 1u}) out.points.unsure[side] = out.points.unsure[side] || rule.outcome.thirds;
     return fits;
@@ -354,8 +421,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
       return;
     }
     if (pressing == Pressing::Some) {
-      // The squeezed regions of bodies with several parts are not cut that exactly.
-      fits = !job.parted() && polar_cut(job, out);
+      fits = polar_cut(job, out);
       if (!fits && any) reason = RuleReason::ThirdBody;
     }
   }
@@ -476,7 +542,7 @@ void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandida
   if (!std::isfinite(extent)) return;  // two half-spaces
 
   const Region least = settings.energy ? Region::Sums : Region::None;
-  Job job{bodies, boxes, overlap, seeds, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
+  Job job{bodies, boxes, overlap, seeds, pair, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
   find_thirds(job, pair, partners);
   job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());

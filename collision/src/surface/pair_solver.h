@@ -42,11 +42,11 @@ class PairSolver {
     std::span<const Box> boxes;
     const Box& overlap;
     std::span<const Vec3> seeds;
+    BodyPair pair;
     const ContactBody &a, &b;
     PolarJob polar;
     bool convex;
     [[nodiscard]] const ContactSettings& settings() const { return polar.settings; }
-    [[nodiscard]] bool parted() const { return a.pose.size() > 1 || b.pose.size() > 1; }
   };
 
   bool join_team(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners, const BodyPair& pair);
@@ -57,6 +57,8 @@ class PairSolver {
   void find_patches(const Job& job, std::span<const Vec3> seeds);
   bool rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out);
   bool polar(const Job& job, PairResult& out);
+  bool imprints_cut(const Job& job, PairResult& out);
+  bool stars_cut(const Job& job, double asked, PairResult& out);
   bool polar_cut(const Job& job, PairResult& out);
   bool samples(const Job& job, bool few, PairResult& out);
   bool march(const Job& job, PairResult& out);
@@ -65,6 +67,7 @@ class PairSolver {
   [[nodiscard]] bool suits_panels(const Job& job) const;
   void choose(const Job& job, PairResult& out);
   void take_all_thirds(const Job& job);
+  void take_third_levels(const Job& job, std::span<const ContactBody* const> taken);
   void begin_anew(const Job& job, PairResult& out);
   static double region_error(const ContactSettings& settings);
   void fill_unsure_regions(const Job& job, PairResult& out);
@@ -81,6 +84,8 @@ class PairSolver {
   PeakFinder finder_;
   StartPoints starts_;
   std::vector<ThirdLevel> third_levels_;
+  std::vector<ImprintPlace> imprints_;
+  std::vector<PatchShare> share_;
   SqueezedRegion region_;
   Teams teams_;                  ///< of the body of the pair
   const Team* team_ = nullptr;   ///< of the pair's obstacle

@@ -22,6 +22,7 @@ struct PatchSums {
   double load = 0.0;            ///< integral of p dA [N]
   double area = 0.0;            ///< [m^2]
   double spread = 0.0;          ///< integral of |x - reference|^2 p dA [N m^2]
+  std::array<double, 2> flux{};  ///< about the energies of A and B, where columns out of an apex carry them (Apex); else 0 [J]
 
   void add(const Vec3& from_reference, const Vec3& normal, double weight, double pressure) {
     const Vec3 f = (weight * pressure) * normal;
@@ -36,6 +37,7 @@ struct PatchSums {
   void reverse() {
     force = -force;
     moment = -moment;
+    std::swap(flux[0], flux[1]);
   }
   void add(const PatchSums& other, double weight = 1.0) {
     force += weight * other.force;
@@ -44,6 +46,7 @@ struct PatchSums {
     load += weight * other.load;
     area += weight * other.area;
     spread += weight * other.spread;
+    for (const std::size_t side : {0u, 1u}) flux[side] += weight * other.flux[side];
   }
   [[nodiscard]] Vec3 centre() const { return load > 0.0 ? Vec3(first / load) : Vec3::Zero().eval(); }
 };

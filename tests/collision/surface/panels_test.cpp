@@ -223,6 +223,16 @@ TEST(Panels, OfASliverBesideAThirdBodyAreAsGoodAsAsked) {
     EXPECT_LE(s.error_estimate, asked);
     EXPECT_NEAR(s.force.norm(), kForce, asked * kForce) << asked;
   }
+  // Without a rule by name, too, and by rays from the peak; the area is that of marching to 1e-8.
+  constexpr double kArea = 2.88039746e-3;
+  for (const ContactRule only : {ContactRule::None, ContactRule::Polar}) {
+    for (const double asked : {1e-2, 1e-3, 1e-4}) {
+      const ContactSurface::Summary s = stage.solve({.error = asked, .only = only}).summary.at(0);
+      EXPECT_LE(s.error_estimate, asked);
+      EXPECT_NEAR(s.force.norm(), kForce, s.error_estimate * kForce) << asked;
+      EXPECT_NEAR(s.area, kArea, s.error_estimate * kArea) << asked;
+    }
+  }
 }
 
 /// Rings are not cut where bodies have several parts: asked for by name they are refused, not summed as if nothing were there.

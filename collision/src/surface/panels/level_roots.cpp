@@ -48,15 +48,21 @@ void add_roots(const Hermite& cubic, bool open_low, bool open_high, std::vector<
   const bool positive = from.value > 0.0;
   if (positive != (to.value > 0.0)) return add(from.place, to.place, open_low, open_high);
   // Two more where the cubic turns on the other side of zero.
-  const double sign = positive ? 1.0 : -1.0;
-  if (!(sign * from.slope < 0.0 && sign * to.slope > 0.0)) return;
-  const double turn = halve([&cubic](double place) { return cubic.slope(place); }, from.place, to.place);
-  if ((value(turn) > 0.0) == positive) return;
-  add(from.place, turn, open_low, true);
-  add(turn, to.place, true, open_high);
+  const std::optional<LevelSample> turn = turn_between(from, to);
+  if (!turn || (turn->value > 0.0) == positive) return;
+  add(from.place, turn->place, open_low, true);
+  add(turn->place, to.place, true, open_high);
 }
 
 }  // namespace
+
+std::optional<LevelSample> turn_between(const LevelSample& from, const LevelSample& to) {
+  const double sign = from.value > 0.0 ? 1.0 : -1.0;
+  if (!(sign * to.value > 0.0) || !(sign * from.slope < 0.0 && sign * to.slope > 0.0)) return std::nullopt;
+  const Hermite cubic{from, to};
+  const double place = halve([&cubic](double at) { return cubic.slope(at); }, from.place, to.place);
+  return LevelSample{place, cubic.value(place), 0.0};
+}
 
 bool predict_roots(std::span<const LevelSample> samples, double begin, double end, std::vector<LevelRoot>& out) {
   const std::size_t n = samples.size();

@@ -2,6 +2,7 @@
 /// Roots of a function along a line that is known by values and slopes at few places: Hermite's cubics between them.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,6 +20,9 @@ struct LevelRoot {
   bool rises;           ///< positive beyond it
   bool open_low, open_high;  ///< the sign at `low`, `high` is that of an extrapolation
 };
+
+/// Where the cubic between two samples of one sign turns, if it does on its way to zero.
+[[nodiscard]] std::optional<LevelSample> turn_between(const LevelSample& from, const LevelSample& to);
 
 /// @param samples  at least one, by rising places within [begin, end]   @param out  appended, by rising places
 /// @return whether the function is positive where the line begins

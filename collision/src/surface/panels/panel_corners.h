@@ -16,11 +16,20 @@ struct LineEnd {
   double drift;         ///< of the place from line to line, over the distance between them [1]
 };
 
+/// The piece of a line that the patch has, between two levels; of a line that misses the patch, the place where it comes nearest to having one: two levels are
+/// negative there alone, the one before and the other one beyond.
+struct LineSlot {
+  std::uint16_t enters, leaves;  ///< levels
+  double length;                 ///< negative: by how much it misses [m]
+  double drift;                  ///< of the length, from line to line
+};
+
 /// A line of a panel.
 struct LineShape {
   double at;                      ///< its coordinate across the lines [m]
   double area = 0.0, load = 0.0;  ///< of the strip around it over the strip's width [m], [N/m]
   std::span<const LineEnd> ends;  ///< by rising places: enters, leaves, enters, ...
+  std::optional<LineSlot> missed{};  ///< of a line without ends
 };
 
 /// What may be wrong between two lines that are not cut alike.

@@ -3,20 +3,23 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
+
+#include "supple/core/math.h"
 
 namespace supple::collision {
 namespace {
 
 constexpr double kLeastCosine = 0.3;  // between the normals of a graph and its rays
-constexpr std::size_t kMostPanels = 4096;
+constexpr std::size_t kMostPanels = 4096, kMostOfStar = 512;
 constexpr int kMostDepth = 24;
 constexpr double kSafety = 2.0;               // of estimates: two orders may both miss something
 
 /// What panels are held to: force, area, and first moment of the load about its centre.
 struct Errors {
   Vec3 force = Vec3::Zero(), first = Vec3::Zero();
-  double area = 0.0, force_square = 0.0, first_square = 0.0, area_square = 0.0, missed_load = 0.0, missed_area = 0.0;
+  double energy = 0.0, energy_square = 0.0, area = 0.0, force_square = 0.0, first_square = 0.0, area_square = 0.0, missed_load = 0.0, missed_area = 0.0;
 };
 
 double least_cosine(std::span<const Vec3> normals, const Vec3& axis) {
@@ -27,7 +30,7 @@ double least_cosine(std::span<const Vec3> normals, const Vec3& axis) {
 
 /// The axis from which all normals are seen best: their mean, or, where some lie far from it, near the axis of the narrowest cone around them, by steps
 /// towards the farthest one that become shorter (Badoiu and Clarkson 2003).
-Vec3 middle_of(std::span<const Vec3> normals, const Vec3& sum) {
+Vec3 best_axis(std::span<const Vec3> normals, const Vec3& sum) {
   constexpr double kSeenWell = 0.7;
   constexpr int kSteps = 64;
   Vec3 axis = sum.norm() > 0.0 ? Vec3(sum.normalized()) : normals.front();
@@ -49,7 +52,7 @@ Vec3 middle_of(std::span<const Vec3> normals, const Vec3& sum) {
 class PanelSolver {
  public:
   PanelSolver(const PanelJob& job, PanelRoom& room)
-      : job_(job), r_(room), setting_{{job.pressure, {}, 0.5 * std::min(job.pressure.feature_size(), job.overlap.extent().norm())}, {job.third, {}}, order_of(job.error), 0.0, 0.1 * std::sqrt(job.error), job.reference} {}
+      : job_(job), r_(room), setting_{{job.pressure, {}, 0.5 * std::min(job.pressure.feature_size(), job.overlap.extent().norm())}, {job.third, {}}, {}, {}, order_of(job.error), 0.0, 0.1 * std::sqrt(job.error), job.reference} {}
 
   bool solve(PatchPoints& points, PanelOutcome& out);
 
@@ -58,16 +61,23 @@ class PanelSolver {
   static int order_of(double error) { return std::clamp(static_cast<int>(std::lround(2.0 - 0.5 * std::log10(error))), 3, 8); }
 
   bool find_frame();
+  bool set_star(double margin);
+  void set_enough(double depth);
   void start();
+  void start_star();
+  bool begin();
   void add_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, bool walls, const Panel* parent);
   void choose_axes(std::size_t first);
   [[nodiscard]] Box box_of(const Panel& panel) const;
   void set_levels(Panel& panel);
+  [[nodiscard]] Vec3 middle_of(const Panel& panel) const;
   [[nodiscard]] bool crosses(const implicit::Kink& kink, const Panel& panel) const;
   void measure(std::size_t first);
   void look_for_starts(Panel& panel) const;
+  void look_for_imprints(Panel& panel) const;
   [[nodiscard]] double estimate();
   [[nodiscard]] double error_of(const Panel& panel) const;
+  [[nodiscard]] double energy_scale() const;
   bool choose();
   void refine();
   void split(const Panel& panel, std::size_t axis, double place, bool walls);
@@ -81,6 +91,7 @@ class PanelSolver {
   bool graph_ = true;
   bool kinks_known_ = false;
   PatchSums all_;
+  double energy_ = 1.0;  // that errors of fluxes are measured against [J]
 };
 
 /// The frame whose last axis is the mean normal where the bodies press, and whether Sigma seems to be a graph over it.
@@ -115,16 +126,70 @@ bool PanelSolver::find_frame() {
   }
   if (!(all > 0.0)) return false;
   place /= all;
-  const Vec3 axis = middle_of(normals, normal);
+  const Vec3 axis = best_axis(normals, normal);
   graph_ = least_cosine(normals, axis) > kLeastCosine;
   const Vec3 first = job_.pressure.tangent(place, axis).value_or(axis.unitOrthogonal());
   const Vec3 u = (first - first.dot(axis) * axis).normalized();
   setting_.view.frame = {place, {u, axis.cross(u), axis}};
   for (Vec3& x : r_.start) x = setting_.view.frame.local(x);
+  set_enough(depth);
+  return true;
+}
+
+/// @param depth  of the overlap [m]
+void PanelSolver::set_enough(double depth) {
   constexpr double kEnough = 0.03, kLeastDepth = 1e-9;
   const double feature = 2.0 * setting_.view.reach;
   setting_.enough = kEnough * std::sqrt(job_.error * std::clamp(depth, kLeastDepth * feature, feature) * feature);
+}
+
+/// The frame and the reach of a star that holds a patch. @param margin  beyond the rim as it is known, over its distance
+bool PanelSolver::set_star(double margin) {
+  constexpr std::size_t kAngles = 64;
+  const PolarCover& cover = *job_.star;
+  const PeakFrame& frame = cover.frame;
+  setting_.view.frame = {frame.origin, {frame.u.normalized(), frame.v.normalized(), frame.axis}};
+  setting_.chart.axis = {frame.u.norm(), frame.v.norm()};
+  std::array<double, kAngles> reach{};
+  for (std::size_t k = 0; k < kAngles; ++k) {
+    const auto [sine, cosine] = math::sin_cos(2.0 * std::numbers::pi * static_cast<double>(k) / kAngles);
+    const double far = cover.reach({cosine, sine}).far;
+    if (!(far > 0.0)) return false;
+    reach[k] = margin / far;
+  }
+  setting_.chart.wave = PlaneChart::waves_of(reach);
+  set_enough(std::max(cover.thickness, frame.thickness));
+  r_.start.clear();
+  r_.start_pressure.clear();
   return true;
+}
+
+/// Four sectors, from the heights of the rim.
+void PanelSolver::start_star() {
+  constexpr int kSectors = 4;
+  const PolarCover& cover = *job_.star;
+  double low = 0.0, high = 0.0;
+  const auto add = [&](const Vec3& x) {
+    const Vec3 y = setting_.view.frame.local(x);
+    SigmaRay ray;
+    ray.at = {y[0], y[1]};
+    ray.height = y[2];
+    ray.found = true;
+    r_.arena.node.push_back(ray);
+    low = std::min(low, y[2]);
+    high = std::max(high, y[2]);
+  };
+  add(cover.frame.origin);
+  for (const Vec3& x : cover.rim) add(x);
+  const double beside = (high - low) + std::max(cover.thickness, cover.frame.thickness);
+  for (int k = 0; k < kSectors; ++k) {
+    constexpr double kWidth = 2.0 * std::numbers::pi / kSectors;
+    Panel panel;
+    panel.low = {k * kWidth, 0.0, low - beside};
+    panel.high = {(k + 1) * kWidth, 1.0, high + beside};
+    panel.guess = {0, static_cast<std::uint32_t>(r_.arena.node.size())};
+    r_.panel.push_back(panel);
+  }
 }
 
 Box PanelSolver::box_of(const Panel& panel) const {
@@ -133,6 +198,23 @@ Box PanelSolver::box_of(const Panel& panel) const {
   for (std::size_t k = 0; k < 3; ++k) {
     centre[static_cast<Eigen::Index>(k)] = 0.5 * (panel.low[k] + panel.high[k]);
     half[static_cast<Eigen::Index>(k)] = 0.5 * (panel.high[k] - panel.low[k]);
+  }
+  if (setting_.chart.star()) {
+    // Places of the panel are no farther from its middle than those on its outer arc and its corners; between these the star reaches as far as straight
+    // lines have it.
+    constexpr int kPlaces = 8;
+    const PlaneChart::Place middle = setting_.chart.at({centre[0], centre[1]});
+    double far = 0.0;
+    for (int i = 0; i <= kPlaces; ++i) {
+      for (const double share : {panel.low[1], panel.high[1]}) {
+        const PlaneChart::Place at = setting_.chart.at({panel.low[0] + (panel.high[0] - panel.low[0]) * i / kPlaces, share});
+        far = std::max(far, std::hypot(at[0] - middle[0], at[1] - middle[1]));
+      }
+    }
+    constexpr double kBetween = 1.1;  // places of the arc
+    centre[0] = middle[0];
+    centre[1] = middle[1];
+    half[0] = half[1] = kBetween * far;
   }
   const Vec3 middle = frame.world(centre), reach = frame.axis[0].cwiseAbs() * half[0] + frame.axis[1].cwiseAbs() * half[1] + frame.axis[2].cwiseAbs() * half[2];
   return {middle - reach, middle + reach};
@@ -205,17 +287,38 @@ void PanelSolver::choose_axes(std::size_t first) {
   }
 }
 
+/// About where Sigma is above the middle of a panel, from the nearest node that is known.
+Vec3 PanelSolver::middle_of(const Panel& panel) const {
+  const auto half = [&](int k) { return 0.5 * (panel.low[static_cast<std::size_t>(k)] + panel.high[static_cast<std::size_t>(k)]); };
+  SigmaRay ray;
+  ray.along = panel.along;
+  ray.at = setting_.chart.at({half(first_across(panel.along)), half(second_across(panel.along))});
+  ray.height = half(panel.along);
+  const Slice known = panel.nodes.size() > 0 ? panel.nodes : panel.guess;
+  double least = std::numeric_limits<double>::infinity();
+  for (const SigmaRay& node : std::span(r_.arena.node).subspan(known.begin, known.size())) {
+    const double u = ray.at[0] - node.at[0], v = ray.at[1] - node.at[1];
+    if (!node.found || node.along != panel.along || std::hypot(u, v) >= least) continue;
+    least = std::hypot(u, v);
+    ray.height = node.height + u * node.rise[0] + v * node.rise[1];
+  }
+  return setting_.view.frame.world(ray.local(ray.height));
+}
+
 bool PanelSolver::crosses(const implicit::Kink& kink, const Panel& panel) const {
   // A kink in a third derivative bends the pressure so little that halving is cheaper down to here.
-  constexpr double kThirdDerivative = 1e-5;
-  if (kink.order > 2 && job_.error >= kThirdDerivative) return false;
-  // Around the nodes' feet, as far as the panel reaches across.
-  const double u = panel.high[static_cast<std::size_t>(first_across(panel.along))] - panel.low[static_cast<std::size_t>(first_across(panel.along))];
-  const double v = panel.high[static_cast<std::size_t>(second_across(panel.along))] - panel.low[static_cast<std::size_t>(second_across(panel.along))];
-  const double radius = 0.5 * std::hypot(u, v) / kLeastCosine;
-  const std::size_t middle = panel.nodes.begin + panel.nodes.size() / 2;
-  const SigmaRay& ray = r_.arena.node[middle];
-  const Vec3 x = setting_.view.frame.world(ray.local(ray.height));
+  constexpr double kThirdDerivative = 1e-5, kOfStar = 1e-4;
+  const bool star = job_.star != nullptr;
+  if (kink.order > 2 && (star ? job_.error > kOfStar : job_.error >= kThirdDerivative)) return false;
+  // Around the middle, as far as the panel reaches across.
+  const Box box = box_of(panel);
+  double square = 0.0;
+  for (const int k : {first_across(panel.along), second_across(panel.along)}) {
+    const double reach = box.extent().dot(setting_.view.frame.axis[static_cast<std::size_t>(k)].cwiseAbs());
+    square += reach * reach;
+  }
+  const double radius = 0.5 * std::sqrt(square) / kLeastCosine;
+  const Vec3 x = middle_of(panel);
   return std::abs(kink.value(x)) <= kink.change(x, radius);
 }
 
@@ -228,7 +331,7 @@ void PanelSolver::set_levels(Panel& panel) {
   for (std::size_t t = 0; t < job_.third.size(); ++t) {
     if (job_.third[t].body->field.bound(box).upper > 0.0) level.push_back(static_cast<std::uint16_t>(Levels::kFirstThird + t));
   }
-  for (std::size_t k = 0; k < r_.kink.size() && panel.cut && panel.nodes.size() > 0; ++k) {
+  for (std::size_t k = 0; k < r_.kink.size() && panel.cut; ++k) {
     if (crosses(r_.kink[k], panel)) level.push_back(static_cast<std::uint16_t>(setting_.levels.first_kink() + k));
   }
   panel.levels.end = static_cast<std::uint32_t>(level.size());
@@ -243,6 +346,7 @@ void PanelSolver::measure(std::size_t first) {
   for (const std::uint32_t i : r_.which) {
     Panel& panel = r_.panel[i];
     if (panel.points.size() == 0) look_for_starts(panel);
+    if (panel.points.size() > 0) look_for_imprints(panel);
     if (!panel.steep) continue;
     panel.off = panel.sums;
     panel.missed_load = std::max(panel.missed_load, panel.sums.load);
@@ -271,17 +375,41 @@ void PanelSolver::look_for_starts(Panel& panel) const {
   panel.missed_load = std::max(panel.missed_load, most * area / 3.0);
 }
 
+/// A panel that holds a place where a third body presses harder, which none of its lines tells, has too much by what lies between nodes.
+void PanelSolver::look_for_imprints(Panel& panel) const {
+  for (const ImprintPlace& imprint : job_.imprint) {
+    if ((panel.thirds & third_bit(imprint.third)) != 0) continue;
+    const Vec3 y = setting_.view.frame.local(imprint.at);
+    const PlaneChart::Place place = setting_.chart.place_of({y[0], y[1]});
+    if (!(place[0] >= panel.low[0] && place[0] <= panel.high[0] && place[1] >= panel.low[1] && place[1] <= panel.high[1])) continue;
+    constexpr double kBetween = 2.0;  // what lies between four nodes, over what one stands for
+    const double share = kBetween / (setting_.order * setting_.order);
+    panel.missed_area += share * panel.sums.area;
+    panel.missed_load += share * panel.sums.load;
+  }
+}
+
+/// That errors of fluxes are measured against: those of one sign, as others may cancel.
+double PanelSolver::energy_scale() const {
+  double sum = 0.0;
+  for (const Panel& panel : r_.panel) sum += std::abs(panel.sums.flux[0]) + std::abs(panel.sums.flux[1]);
+  return std::max(sum, std::numeric_limits<double>::min());
+}
+
 double PanelSolver::error_of(const Panel& panel) const {
   if (!(all_.load > 0.0) || !(all_.area > 0.0)) return panel.missed_load > 0.0 ? 1.0 : 0.0;
   const Vec3 first = panel.off.first - panel.off.load * all_.centre();
   return std::max({(panel.off.force.norm() + panel.missed_load) / force_scale(all_.force, all_.load), (std::abs(panel.off.area) + panel.missed_area) / all_.area,
-                   first.norm() / (all_.load * std::sqrt(all_.area))});
+                   first.norm() / (all_.load * std::sqrt(all_.area)), std::abs(panel.off.flux[0] + panel.off.flux[1]) / energy_});
 }
 
 /// What two orders differ by over all panels, and what is left where their differences cancel by chance: the root of the sum of squares.
 double PanelSolver::estimate() {
   all_ = {};
   for (const Panel& panel : r_.panel) all_.add(panel.sums);
+  energy_ = energy_scale();
+  const auto missed = [](const Panel& panel) { return panel.missed_load > 0.0; };
+  if (job_.star != nullptr && r_.panel.size() > 0 && !(all_.load > 0.0) && std::none_of(r_.panel.begin(), r_.panel.end(), missed)) return 0.0;
   if (!(all_.load > 0.0) || !(all_.area > 0.0)) return 1.0;
   Errors e;
   const Vec3 centre = all_.centre();
@@ -295,11 +423,15 @@ double PanelSolver::estimate() {
     e.area_square += panel.off.area * panel.off.area;
     e.missed_load += panel.missed_load;
     e.missed_area += panel.missed_area;
+    const double flux = panel.off.flux[0] + panel.off.flux[1];
+    e.energy += flux;
+    e.energy_square += flux * flux;
   }
   const double force = (e.force.norm() + std::sqrt(e.force_square) + e.missed_load) / force_scale(all_.force, all_.load);
   const double area = (std::abs(e.area) + std::sqrt(e.area_square) + e.missed_area) / all_.area;
   const double first = (e.first.norm() + std::sqrt(e.first_square)) / (all_.load * std::sqrt(all_.area));
-  return kSafety * std::max({force, area, first});
+  const double energy = (std::abs(e.energy) + std::sqrt(e.energy_square)) / energy_;
+  return kSafety * std::max({force, area, first, energy});
 }
 
 /// Moves the panels that err most to `chosen`; what the others err by is a share of what is asked. @return whether there are such
@@ -381,7 +513,7 @@ void PanelSolver::refine() {
 void PanelSolver::hand_over(PatchPoints& points, PanelOutcome& out) {
   out.sums = all_;
   for (const Panel& panel : r_.panel) {
-    out.thirds = out.thirds || panel.thirds;
+    out.thirds = out.thirds || panel.thirds != 0;
     for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
       const PanelPoint& p = r_.arena.point[i];
       points.point.push_back(p.at);
@@ -423,19 +555,53 @@ bool PanelSolver::has_one_sheet() {
   return true;
 }
 
+/// The first panels. @return false where they do not fit
+bool PanelSolver::begin() {
+  constexpr double kMargin = 1.1, kWider = 1.4, kWidest = 4.0;  // of a star, beyond the rim as it is known
+  if (job_.star == nullptr) {
+    if (!find_frame() || (job_.graph_only && !graph_)) return false;
+    start();
+    if (!graph_) choose_axes(0);
+    measure(0);
+    return true;
+  }
+  for (const std::size_t side : {0u, 1u}) {
+    if (job_.regions[side] == Region::None) continue;
+    setting_.apex[side] = find_apex(job_.pressure, static_cast<int>(side), job_.rival, job_.star->frame.origin, (side == 0 ? 1.0 : -1.0) * job_.star->frame.axis);
+  }
+  for (double margin = kMargin; margin <= kWidest; margin *= kWider) {
+    r_.arena.clear();
+    r_.panel.clear();
+    if (!set_star(margin)) return false;
+    start_star();
+    measure(0);
+    if (std::none_of(r_.panel.begin(), r_.panel.end(), [](const Panel& panel) { return panel.open; })) return true;
+  }
+  return false;
+}
+
 bool PanelSolver::solve(PatchPoints& points, PanelOutcome& out) {
   r_.arena.clear();
   r_.panel.clear();
   r_.kink.clear();
-  if (!find_frame() || (job_.graph_only && !graph_)) return false;
-  start();
-  if (!graph_) choose_axes(0);
-  measure(0);
-  for (out.estimate = estimate(); out.estimate > job_.error && r_.panel.size() < kMostPanels && choose(); out.estimate = estimate()) refine();
-  if (!(all_.load > 0.0) || (job_.graph_only && !has_one_sheet())) return false;
+  if (!begin()) return false;
+  const bool star = job_.star != nullptr;
+  const auto fits = [&] { return !star || std::none_of(r_.panel.begin(), r_.panel.end(), [](const Panel& panel) { return panel.open || panel.steep; }); };
+  const std::size_t most = star ? kMostOfStar : kMostPanels;
+  for (out.estimate = estimate(); fits() && out.estimate > job_.error && r_.panel.size() < most && choose(); out.estimate = estimate()) refine();
+  if (!fits()) return false;
+  const bool taken = star && out.estimate == 0.0 && !(all_.load > 0.0);
+  if (!taken && (!(all_.load > 0.0) || (job_.graph_only && !has_one_sheet()))) return false;
   hand_over(points, out);
-  const int along = setting_.order - (job_.energy ? 1 : 2);
-  add_columns({job_.pressure, setting_.view.frame.axis[2], along, setting_.enough, setting_.view.reach, job_.regions}, r_.panel, r_.arena.point, points);
+  ColumnJob columns{job_.pressure, setting_.view.frame.axis[2], {}, setting_.order - (job_.energy ? 1 : 2), setting_.enough, setting_.view.reach, job_.regions, job_.error};
+  for (const std::size_t side : {0u, 1u}) {
+    if (!star || job_.regions[side] == Region::None) continue;
+    columns.apex[side] = setting_.apex[side];
+    if (columns.apex[side]) continue;
+    points.unsure[side] = true;
+    columns.regions[side] = Region::None;
+  }
+  add_columns(columns, r_.panel, r_.arena.point, points);
   return true;
 }
 

@@ -2,13 +2,24 @@
 /// The contact surface of a pair by panels: few at first, more where the error is largest.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "surface/find_peak.h"
 #include "surface/panels/panels.h"
+#include "surface/polar/apex.h"
+#include "surface/polar/polar_cover.h"
 
 namespace supple::collision {
+
+/// A place of a patch where a third body presses harder than the pair.
+struct ImprintPlace {
+  Vec3 at;
+  std::size_t third;  ///< of `PanelJob::third`
+};
 
 struct PanelJob {
   PairPressure& pressure;
@@ -20,6 +31,9 @@ struct PanelJob {
   Vec3 reference;                     ///< that sums are about
   bool energy;                        ///< wanted as good as the forces; else regions need only share these out
   bool graph_only;                    ///< fits only where Sigma seems to be one graph over a plane
+  const PolarCover* star = nullptr;   ///< panels of a star about its origin, which holds one patch; or null: of the plane across the mean normal
+  std::span<const ImprintPlace> imprint{};  ///< that may lie between nodes
+  std::span<const ContactBody* const> rival{};  ///< the third bodies, where a star shares space with them
 };
 
 struct PanelOutcome {
@@ -44,21 +58,23 @@ struct PanelRoom {
 };
 
 /// @param points  receives those of Sigma, and of the squeezed regions that `regions` asks for
-/// @return false where there is no place to start from, Sigma is nowhere positive, or it does not fit
+/// @return false where there is no place to start from, Sigma is nowhere positive but beneath third bodies, or it does not fit
 bool solve_by_panels(const PanelJob& job, PanelRoom& room, PatchPoints& points, PanelOutcome& out);
 
 /// Lines from points of Sigma through the squeezed regions.
 struct ColumnJob {
   PairPressure& pressure;
   Vec3 way;            ///< of the columns, out of A into B [unit]
+  std::array<std::optional<Apex>, 2> apex;  ///< that those of A, of B come out of instead
   int order;           ///< Gauss points of a column
   double enough;       ///< of a step to a column's end [m]
   double reach;        ///< longest step that is believed [m]
   Regions regions;
+  double error;        ///< relative, of what a whole body has
 };
 
 /// The integral of p_A over V_A, of a body that every line along the way leaves once, is the flux through Sigma of way times the integral of p_A from
-/// there to where A ends, as the divergence of that is -p_A (Gauss); so is that of B along the opposite way.
+/// there to where A ends, as the divergence of that is -p_A (Gauss); so is that of B along the opposite way. Columns out of an apex widen (Apex).
 void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<const PanelPoint> sigma, PatchPoints& points);
 
 }  // namespace supple::collision

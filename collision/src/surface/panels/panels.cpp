@@ -1,28 +1,13 @@
-#include "surface/panels/panels.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
-#include "surface/quadrature.h"
+#include "surface/panels/panel_pass.h"
 
 namespace supple::collision {
+namespace panel_pass {
 namespace {
-
-/// Least cosine between Sigma's normal and the rays that see it.
-constexpr double kLeastCosine = 0.3;
-
-using Plane = std::array<double, 2>;
-
-std::size_t across(const Panel& panel, std::size_t k) { return static_cast<std::size_t>(k == 0 ? first_across(panel.along) : second_across(panel.along)); }
-double low_of(const Panel& panel, std::size_t k) { return panel.low[across(panel, k)]; }
-double width_of(const Panel& panel, std::size_t k) { return panel.high[across(panel, k)] - low_of(panel, k); }
-
-void part(Panel& panel, std::size_t coordinate, double place) {
-  panel.parting = static_cast<std::uint8_t>(coordinate);
-  panel.parting_place = place;
-}
-void part(Panel& panel, std::size_t coordinate) { part(panel, coordinate, low_of(panel, coordinate) + 0.5 * width_of(panel, coordinate)); }
 
 /// Polynomials of the two highest degrees above 1 that n Gauss points tell apart, the second one zero where there is but one: times the weights, orthonormal
 /// on (0, 1). Two, as functions may be even or odd.
@@ -55,66 +40,28 @@ const HighestPolynomials& highest_polynomials(int n) {
   return all[static_cast<std::size_t>(n)];
 }
 
-/// One pass over panels with a rule of one order.
-class Pass {
- public:
-  Pass(PanelSetting& setting, std::span<Panel> panels, std::span<const std::uint32_t> which, int order, PanelArena& arena)
-      : s_(setting), panels_(panels), which_(which), order_(order), n_(static_cast<std::size_t>(order)), gauss_(gauss_rule(order)), a_(arena) {}
+}  // namespace
 
-  void place_lattice();
-  void look_at_lattice();
-  void bracket_between_walls();
-  void make_lines();
-  void find_least();
-  void predict();
-  void search();
-  void make_pieces();
-  /// @param first  of the two orders: points are kept
-  void add_up(bool first);
+/// Values of the levels of `query`, with their derivatives by the panel's coordinates.
+void Pass::evaluate(std::span<const SigmaRay> rays) {
+  a_.value.resize(a_.query.size());
+  evaluate_levels(s_.levels, s_.view, rays, a_.query, a_.levels, a_.value);
+  for (std::size_t i = 0; i < a_.query.size(); ++i) a_.value[i].slope = s_.chart.slopes(rays[a_.query[i].ray].place, a_.value[i].slope);
+}
 
- private:
-  [[nodiscard]] Plane lattice_place(const Panel& panel, std::size_t i, std::size_t j) const {
-    return {low_of(panel, 0) + gauss_.node[i] * width_of(panel, 0), low_of(panel, 1) + gauss_.node[j] * width_of(panel, 1)};
-  }
-  /// The rays of the panel that a line belongs to.
-  [[nodiscard]] std::span<const SigmaRay> lattice_of(std::uint32_t line) const { return std::span<const SigmaRay>(a_.ray).subspan((line / n_) * n_ * n_, n_ * n_); }
-  [[nodiscard]] SigmaRay start_ray(const Panel& panel, const Plane& at, std::span<const SigmaRay> near) const;
-  /// A ray of the lattice as far as it tells what is beside it.
-  struct Node {
-    Plane at;
-    double pressure;  // or what else bounds the patch more
-    Plane slope;
-    bool found;
-  };
-  [[nodiscard]] Node node(std::size_t k, std::size_t i) const {
-    const SigmaRay& ray = a_.ray[k * n_ * n_ + i];
-    const LevelValue& least = a_.least[k * n_ * n_ + i];
-    return {ray.at, least.value, least.slope, ray.found};
-  }
-  void look_beyond(Panel& panel, std::size_t k, bool upper, double& most) const;
-  void look_aside(Panel& panel, std::size_t k, std::size_t in, bool upper, double& most) const;
-  void look_between(Panel& panel, std::size_t k, double most) const;
-  void predict_line(std::uint32_t line, std::uint16_t level, std::size_t row, std::size_t stride);
-  void step_searches();
-  bool judge(PanelArena::Search& search, const LevelValue& value, const SigmaRay& ray);
-  void cut_line(std::uint32_t line);
-  void add_piece(std::uint32_t line, double begin, double end);
-  void judge_panel(std::size_t k, const Plane& rough);
-  double add_points(const PanelArena::Piece& piece, Panel& panel, PatchSums& sums, bool first);
-
-  PanelSetting& s_;
-  std::span<Panel> panels_;
-  std::span<const std::uint32_t> which_;
-  int order_;
-  std::size_t n_;
-  const GaussRule& gauss_;
-  PanelArena& a_;
-};
+/// The coordinate along which the panel is longer, as places in the plane lie.
+std::size_t Pass::longer(const Panel& panel) const {
+  const Plane middle{low_of(panel, 0) + 0.5 * width_of(panel, 0), low_of(panel, 1) + 0.5 * width_of(panel, 1)};
+  const Plane u = s_.chart.slopes(middle, {1.0, 0.0}), v = s_.chart.slopes(middle, {0.0, 1.0});
+  return width_of(panel, 0) * std::hypot(u[0], v[0]) >= width_of(panel, 1) * std::hypot(u[1], v[1]) ? 0 : 1;
+}
 
 /// From the nearest ray that is known.
-SigmaRay Pass::start_ray(const Panel& panel, const Plane& at, std::span<const SigmaRay> near) const {
+SigmaRay Pass::start_ray(const Panel& panel, const Plane& place, std::span<const SigmaRay> near) const {
   SigmaRay ray;
-  ray.at = at;
+  ray.place = place;
+  ray.at = s_.chart.at(place);
+  const Plane& at = ray.at;
   ray.along = panel.along;
   ray.reverse = panel.reverse;
   const double low = panel.low[panel.along], high = panel.high[panel.along], margin = 0.5 * (high - low);
@@ -160,97 +107,14 @@ void Pass::look_at_lattice() {
       // A foot between walls that the signs at these do not tell has another one beside it.
       const bool more = panel.walls && !ray.bracketed;
       if (ray.pressure > 0.0 && inside) panel.steep = panel.steep || ray.cosine < kLeastCosine || more;
-      for (const std::size_t c : {0u, 1u}) change[c] += std::abs(ray.slope[c]) * width_of(panel, c);
+      const Plane slope = s_.chart.slopes(ray.place, ray.slope);
+      for (const std::size_t c : {0u, 1u}) change[c] += std::abs(slope[c]) * width_of(panel, c);
     }
-    panel.inner = change[0] >= change[1] ? 0 : 1;
-    part(panel, width_of(panel, 0) >= width_of(panel, 1) ? 0 : 1);
+    panel.inner = !s_.chart.star() && change[0] >= change[1] ? 0 : 1;
+    part(panel, longer(panel));
     panel.nodes = {static_cast<std::uint32_t>(a_.node.size()), static_cast<std::uint32_t>(a_.node.size() + rays.size())};
     a_.node.insert(a_.node.end(), rays.begin(), rays.end());
   }
-}
-
-/// What may press beyond an outermost line that does not, by parabolas from its nodes to the side of the panel, and in its corners.
-void Pass::look_beyond(Panel& panel, std::size_t k, bool upper, double& most) const {
-  const std::size_t in = panel.inner, out = 1 - in, along = in == 0 ? 1 : n_, step = out == 0 ? 1 : n_;
-  const std::size_t first = upper ? (n_ - 1) * step : 0;
-  const auto near = [&](std::size_t i, bool other) { return node(k, first + i * along + (other ? (upper ? -step : step) : 0)); };
-  const double side = low_of(panel, out) + (upper ? width_of(panel, out) : 0.0);
-  const auto add = [&](double area, double load, double place) {
-    panel.missed_area += area;
-    panel.missed_load += load;
-    if (area <= most) return;
-    most = area;
-    part(panel, out, place);
-  };
-  for (std::size_t i = 0; i < n_; ++i) {
-    const Node ray = near(i, false), other = near(i, true);
-    if (!ray.found) continue;
-    const double way = side - ray.at[out], bend = other.found ? (other.slope[out] - ray.slope[out]) / (other.at[out] - ray.at[out]) : 0.0;
-    const double slope = ray.slope[out] + way * bend, pressure = ray.pressure + way * (ray.slope[out] + 0.5 * way * bend);
-    if (pressure > 0.0 && slope != 0.0) {
-      const double area = gauss_.weight[i] * width_of(panel, in) * std::min(pressure / std::abs(slope), std::abs(way));
-      add(area, 0.5 * pressure * area, ray.at[out]);
-    }
-    if (i != 0 && i + 1 != n_) continue;
-    const Node beside = near(i == 0 ? 1 : i - 1, false);
-    const double to_corner = low_of(panel, in) + (i == 0 ? 0.0 : width_of(panel, in)) - ray.at[in];
-    const double bend_in = beside.found ? (beside.slope[in] - ray.slope[in]) / (beside.at[in] - ray.at[in]) : 0.0;
-    const double twist = other.found ? (other.slope[in] - ray.slope[in]) / (other.at[out] - ray.at[out]) : 0.0;
-    const double in_corner = pressure + to_corner * (ray.slope[in] + way * twist + 0.5 * to_corner * bend_in);
-    if (!(in_corner > 0.0) || slope == 0.0 || ray.slope[in] == 0.0) continue;
-    const double area = 0.5 * std::min(in_corner / std::abs(slope), std::abs(way)) * std::min(in_corner / std::abs(ray.slope[in]), std::abs(to_corner));
-    add(area, in_corner * area / 3.0, ray.at[out]);
-  }
-}
-
-/// What may press along a side of the panel that is nowhere met by what its outermost nodes say of it: where cubics between these turn above zero.
-/// @param in  the coordinate that is fixed there
-void Pass::look_aside(Panel& panel, std::size_t k, std::size_t in, bool upper, double& most) const {
-  const std::size_t out = 1 - in, step = in == 0 ? 1 : n_, along = out == 0 ? 1 : n_;
-  const double side = low_of(panel, in) + (upper ? width_of(panel, in) : 0.0);
-  a_.sample.clear();
-  a_.root.clear();
-  double steepest = 0.0, fall = 0.0;
-  for (std::size_t j = 0; j < n_; ++j) {
-    const Node ray = node(k, j * along + (upper ? (n_ - 1) * step : 0));
-    const Node other = node(k, j * along + (upper ? (n_ - 2) * step : step));
-    if (!ray.found || !other.found) continue;
-    const double way = side - ray.at[in], gap = other.at[in] - ray.at[in];
-    const double slope = ray.slope[in] + way * (other.slope[in] - ray.slope[in]) / gap;
-    const double pressure = ray.pressure + 0.5 * way * (ray.slope[in] + slope);
-    a_.sample.push_back({ray.at[out], pressure, ray.slope[out] + way * (other.slope[out] - ray.slope[out]) / gap});
-    if (pressure > 0.0) return;  // looked at otherwise
-    steepest = std::max(steepest, std::abs(a_.sample.back().slope));
-    fall = std::max(fall, std::abs(slope));
-  }
-  if (a_.sample.size() < 2) return;
-  predict_roots(a_.sample, a_.sample.front().place, a_.sample.back().place, a_.root);
-  for (std::size_t i = 0; i + 1 < a_.root.size(); i += 2) {
-    // A cap as parabolas have it.
-    const double chord = a_.root[i + 1].guess - a_.root[i].guess, height = 0.25 * chord * steepest;
-    const double area = 2.0 / 3.0 * chord * std::min(height / fall, (1.0 - gauss_.node.back()) * width_of(panel, in));
-    panel.missed_area += area;
-    panel.missed_load += 0.4 * height * area;
-    if (area <= most) continue;
-    most = area;
-    part(panel, in, upper ? low_of(panel, in) + gauss_.node.back() * width_of(panel, in) : low_of(panel, in) + gauss_.node.front() * width_of(panel, in));
-  }
-}
-
-/// What may press between nodes that do not: where the pressure is concave along Sigma, it lies below all its tangents.
-void Pass::look_between(Panel& panel, std::size_t k, double most) const {
-  double below = std::numeric_limits<double>::infinity(), least = 0.0;
-  const Plane middle{low_of(panel, 0) + 0.5 * width_of(panel, 0), low_of(panel, 1) + 0.5 * width_of(panel, 1)};
-  for (std::size_t i = 0; i < n_ * n_; ++i) {
-    const Node ray = node(k, i);
-    below = std::min(below, ray.pressure + ray.slope[0] * (middle[0] - ray.at[0]) + ray.slope[1] * (middle[1] - ray.at[1]));
-    least = std::min(least, ray.pressure);
-  }
-  if (!(below > 0.0)) return;
-  const double area = width_of(panel, 0) * width_of(panel, 1) * below / (below - least);
-  if (area > most) part(panel, width_of(panel, 0) >= width_of(panel, 1) ? 0 : 1);
-  panel.missed_area += area;
-  panel.missed_load += below * area / 3.0;
 }
 
 /// Rays of cells with walls: where p_A - p_B has different signs at these, the foot is sought between them.
@@ -296,7 +160,6 @@ void Pass::make_lines() {
       PanelArena::Line line{};
       line.panel = which_[k];
       line.base[out] = low_of(panel, out) + gauss_.node[j] * width_of(panel, out);
-      line.way[in] = 1.0;
       line.begin = low_of(panel, in);
       line.end = line.begin + width_of(panel, in);
       line.weight = gauss_.weight[j] * width_of(panel, out);
@@ -307,25 +170,38 @@ void Pass::make_lines() {
   }
 }
 
-/// @param row  of the level's value at the first ray of the lattice   @param stride  to that at the next
-void Pass::predict_line(std::uint32_t index, std::uint16_t level, std::size_t row, std::size_t stride) {
-  PanelArena::Line& line = a_.line[index];
-  const std::size_t lattice = (index / n_) * n_ * n_;
-  const Panel& panel = panels_[line.panel];
+/// What is known of a level along a line, to `sample`.
+/// @param row  of its value at the first ray of the lattice   @param stride  to that at the next   @param end  what it is where the line leaves the patch
+void Pass::sample_line(std::uint32_t index, std::uint16_t level, std::size_t row, std::size_t stride, const std::optional<LevelSample>& end) {
+  const PanelArena::Line& line = a_.line[index];
+  const std::size_t lattice = (index / n_) * n_ * n_, inner = panels_[line.panel].inner;
   a_.sample.clear();
   for (std::size_t i = 0; i < n_; ++i) {
     const SigmaRay& ray = a_.ray[line.first + i * line.stride];
     if (!ray.found && level != Levels::kRim) continue;  // there is nothing to be cut
     const LevelValue& value = a_.value[row + (line.first + i * line.stride - lattice) * stride];
-    a_.sample.push_back({ray.at[panel.inner], value.value, value.slope[panel.inner]});
+    if (end && !(ray.place[inner] < end->place)) break;
+    a_.sample.push_back({ray.place[inner], value.value, value.slope[inner]});
   }
+  if (end) a_.sample.push_back(*end);
+  for (const PanelArena::Turn& turn : a_.turn) {
+    if (turn.line != index || turn.level != level || (end && !(turn.sample.place < end->place))) continue;
+    const auto after = std::find_if(a_.sample.begin(), a_.sample.end(), [&](const LevelSample& sample) { return sample.place > turn.sample.place; });
+    a_.sample.insert(after, turn.sample);
+  }
+}
+
+void Pass::predict_line(std::uint32_t index, std::uint16_t level, std::size_t row, std::size_t stride, const std::optional<LevelSample>& end) {
+  PanelArena::Line& line = a_.line[index];
+  sample_line(index, level, row, stride, end);
   if (a_.sample.empty()) return;
   a_.root.clear();
-  const bool positive = predict_roots(a_.sample, line.begin, line.end, a_.root);
+  const bool positive = predict_roots(a_.sample, line.begin, end ? end->place : line.end, a_.root);
   const bool inside = a_.sample.front().value > 0.0;
   for (const LevelRoot& root : a_.root) a_.search.push_back({index, level, root, root.guess, 0.0, inside, false});
   if (a_.root.empty() && !positive && !s_.levels.is_kink(level)) line.dead = true;
-  if (s_.levels.is_third(level)) panels_[line.panel].thirds = panels_[line.panel].thirds || !positive || !a_.root.empty();
+  const bool harder = std::any_of(a_.sample.begin(), a_.sample.end(), [](const LevelSample& sample) { return !(sample.value > 0.0); });
+  if (s_.levels.is_third(level) && harder) panels_[line.panel].thirds |= third_bit(level - Levels::kFirstThird);
 }
 
 /// What bounds the patch most at the rays of the lattice. Walls count as the pressures of both bodies change on the way to them.
@@ -354,10 +230,23 @@ void Pass::predict() {
       }
     }
   }
-  a_.value.resize(a_.query.size());
-  evaluate_levels(s_.levels, s_.view, a_.ray, a_.query, a_.levels, a_.value);
+  evaluate(a_.ray);
   a_.search.clear();
+  a_.hidden.assign(which_.size(), {});
   find_least();
+  a_.rim.clear();
+  a_.rim_search.clear();
+  a_.turn.clear();
+  if (s_.chart.star()) {
+    predict_all(true);
+    meet_rims();
+    look_at_turns();
+  }
+  predict_all(false);
+}
+
+/// @param rims  those alone
+void Pass::predict_all(bool rims) {
   std::size_t begin = 0;
   for (std::size_t k = 0; k < which_.size(); ++k) {
     const Panel& panel = panels_[which_[k]];
@@ -366,8 +255,15 @@ void Pass::predict() {
       const auto index = static_cast<std::uint32_t>(k * n_ + j);
       const PanelArena::Line& line = a_.line[index];
       for (std::size_t l = 0; l < count && !line.dead; ++l) {
-        predict_line(index, a_.level[panel.levels.begin + l], begin + l, count);
+        const std::uint16_t level = a_.level[panel.levels.begin + l];
+        if (s_.chart.star() && (level == Levels::kRim) != rims) continue;
+        predict_line(index, level, begin + l, count, at_rim(index, l));
       }
+    }
+    for (std::size_t l = 0; l < count && !rims; ++l) {
+      if (!s_.levels.is_third(a_.level[panel.levels.begin + l])) continue;
+      look_across(k, begin + l, count);
+      look_beside(k, begin, begin + l, count);
     }
     begin += n_ * n_ * count;
   }
@@ -430,8 +326,7 @@ void Pass::step_searches() {
     const Panel& panel = panels_[a_.line[a_.search[i].line].panel];
     a_.query.push_back({i, a_.search[i].level, {panel.low[panel.along], panel.high[panel.along]}});
   }
-  a_.value.resize(a_.query.size());
-  evaluate_levels(s_.levels, s_.view, a_.cut_ray, a_.query, a_.levels, a_.value);
+  evaluate(a_.cut_ray);
   std::size_t kept = 0;
   for (std::size_t n = 0; n < a_.open.size(); ++n) {
     const std::uint32_t i = a_.open[n];
@@ -439,9 +334,10 @@ void Pass::step_searches() {
     if (!judge(search, a_.value[n], a_.cut_ray[i])) continue;
     SigmaRay& ray = a_.cut_ray[i];
     const std::size_t inner = panels_[a_.line[search.line].panel].inner;
-    const double move = search.place - ray.at[inner];
-    ray.at[inner] = search.place;
-    if (ray.found) ray.height += move * ray.rise[inner];
+    const Plane from = ray.at;
+    ray.place[inner] = search.place;
+    ray.at = s_.chart.at(ray.place);
+    if (ray.found) ray.height += (ray.at[0] - from[0]) * ray.rise[0] + (ray.at[1] - from[1]) * ray.rise[1];
     a_.open[kept++] = i;
   }
   a_.open.resize(kept);
@@ -475,24 +371,34 @@ void Pass::cut_line(std::uint32_t index) {
     if (first != a_.event.end()) negative += event_of(*first).root.rises ? 1 : 0;
   }
   double begin = line.begin;
+  bool ended = false;  // of a star: what presses beyond its rim is another patch
+  const PanelArena::Search* second = nullptr;  // where a second level became negative
   if (negative == 0) a_.end.push_back({LineEnd::kSide, line.begin, 0.0});
   for (const auto& event : a_.event) {
     const PanelArena::Search& search = event_of(event);
     const double end = std::clamp(event.first, begin, line.end);
-    if (negative == 0) add_piece(index, begin, end);
+    if (negative == 0 && !ended) add_piece(index, begin, end);
     begin = end;
     if (s_.levels.is_kink(search.level)) continue;
-    const bool inside = negative == 0;
+    const std::size_t before = negative;
     if (!search.root.rises) ++negative;
     if (search.root.rises && negative > 0) --negative;
-    if (inside != (negative == 0)) a_.end.push_back({search.level, end, search.drift});
+    if ((before == 0) != (negative == 0) && !ended) a_.end.push_back({search.level, end, search.drift});
+    if (before == 1 && negative == 2) second = &search;
+    if (before == 2 && negative == 1 && second != nullptr && second->level != search.level) {
+      const LineSlot slot{search.level, second->level, second->place - search.place, second->drift - search.drift};
+      if (!line.missed || slot.length > line.missed->length) line.missed = slot;
+    }
+    ended = ended || (s_.chart.star() && search.level == Levels::kRim && !search.root.rises);
   }
-  if (negative > 0) return;
+  if (!line.missed && index < a_.rim.size() && a_.rim[index].taken) line.missed = a_.rim[index].missed;
+  if (negative > 0 || ended) return;
   add_piece(index, begin, line.end);
   a_.end.push_back({LineEnd::kSide, line.end, 0.0});
 }
 
 void Pass::make_pieces() {
+  join_rims();
   a_.piece.clear();
   a_.cut_ray.clear();
   a_.end.clear();
@@ -507,12 +413,16 @@ void Pass::make_pieces() {
       bool any = false;
       for (; next != a_.search.end() && next->line == i && next->level == begin->level; ++next) {
         if (next->found) a_.event.emplace_back(next->place, static_cast<std::uint32_t>(next - a_.search.begin()));
+        if (next->found && s_.levels.is_third(next->level)) panels_[line.panel].thirds |= third_bit(next->level - Levels::kFirstThird);
         any = any || next->found;
       }
       // Roots that there are not: all along the line it is what it is inside.
       dead = dead || (!any && !begin->inside && !s_.levels.is_kink(begin->level));
     }
-    if (dead) continue;
+    if (dead) {
+      if (i < a_.rim.size() && a_.rim[i].taken) line.missed = a_.rim[i].missed;
+      continue;
+    }
     if (a_.event.empty()) {
       if (!a_.ray[line.first].found) continue;
       a_.piece.push_back({i, line.first, line.stride, line.begin, line.end, true});
@@ -526,6 +436,17 @@ void Pass::make_pieces() {
   lift(s_.view, a_.cut_ray, s_.enough, a_.rays);
 }
 
+/// What flows out of a body's apex through a place of Sigma, of a pressure that falls evenly to where the body ends.
+void Pass::add_flux(const Vec3& at, const SigmaRay& ray, double area, PatchSums& sums) const {
+  for (const std::size_t side : {0u, 1u}) {
+    const std::optional<Apex>& apex = s_.apex[side];
+    if (!apex || !(ray.pressure > 0.0) || !(ray.fall[side] > 0.0)) continue;
+    const double length = std::min(ray.pressure / ray.fall[side], s_.view.reach), wide = length / apex->distance(at);
+    const double flow = ray.normal.dot(apex->way(at)) * (side == 0 ? 1.0 : -1.0);
+    sums.flux[side] += area * flow * ray.pressure * length * (0.5 + wide * (1.0 / 3.0 + wide / 12.0));
+  }
+}
+
 /// @return what the highest polynomials along the piece hold of the load
 double Pass::add_points(const PanelArena::Piece& piece, Panel& panel, PatchSums& sums, bool first) {
   const PanelArena::Line& line = a_.line[piece.line];
@@ -537,45 +458,14 @@ double Pass::add_points(const PanelArena::Piece& piece, Panel& panel, PatchSums&
     const SigmaRay& ray = rays[piece.first + i * piece.stride];
     if (!ray.found || !(ray.cosine > 0.0)) continue;
     if (ray.pressure > 0.0 && ray.cosine < kLeastCosine) panel.steep = true;
-    const double pressure = std::max(ray.pressure, 0.0), stretch = line.weight * length / ray.cosine, area = stretch * gauss_.weight[i];
+    const double pressure = std::max(ray.pressure, 0.0), stretch = line.weight * length * s_.chart.stretch(ray.place) / ray.cosine, area = stretch * gauss_.weight[i];
     const Vec3 at = s_.view.frame.world(ray.local(ray.height));
     sums.add(at - s_.reference, ray.normal, area, pressure);
     for (const std::size_t d : {0u, 1u}) rough[d] += stretch * highest[d][i] * pressure;
+    add_flux(at, ray, area, sums);
     if (first) a_.point.push_back({at, ray.normal, area, pressure, ray.mismatch, ray.fall, ray.cosine});
   }
   return std::abs(rough[0]) + std::abs(rough[1]);
-}
-
-/// What the panel may hold that no line tells, and where it would be split: at the worst corner, else in the middle of what is roughest.
-/// @param rough  what the highest polynomials hold of the load, along lines and across them
-void Pass::judge_panel(std::size_t k, const Plane& rough) {
-  Panel& panel = panels_[which_[k]];
-  double most = 0.0;
-  panel.missed_load = panel.missed_area = 0.0;
-  for (const bool upper : {false, true}) {
-    look_aside(panel, k, panel.inner, upper, most);
-    if (!(upper ? a_.shape.back() : a_.shape.front()).ends.empty()) continue;
-    look_beyond(panel, k, upper, most);
-    look_aside(panel, k, 1 - panel.inner, upper, most);
-  }
-  if (panel.points.size() == 0) return look_between(panel, k, most);
-  const double beside = most;
-  if (!(beside > 0.0)) part(panel, rough[0] >= rough[1] ? panel.inner : 1 - panel.inner);
-  const std::size_t out = 1 - panel.inner;
-  const double low = low_of(panel, panel.inner), high = low + width_of(panel, panel.inner);
-  constexpr double kLeastShare = 1e-3;  // of the panel, beside a corner
-  for (std::size_t j = 0; j <= n_; ++j) {
-    const double side = low_of(panel, out) + (j == 0 ? 0.0 : width_of(panel, out));
-    const std::optional<PanelCorner> corner =
-        j == 0 || j == n_ ? corner_beyond(a_.shape[j == 0 ? 0 : j - 1], side, low, high) : corner_between(a_.shape[j - 1], a_.shape[j], low, high);
-    if (!corner) continue;
-    panel.missed_area += corner->area;
-    panel.missed_load += corner->load;
-    const double share = (corner->at - low_of(panel, out)) / width_of(panel, out);
-    if (corner->area <= most || share < kLeastShare || share > 1.0 - kLeastShare) continue;
-    most = corner->area;
-    part(panel, out, corner->at);
-  }
 }
 
 void Pass::add_up(bool first) {
@@ -595,7 +485,9 @@ void Pass::add_up(bool first) {
       for (; piece != a_.piece.end() && piece->line == index; ++piece) along += add_points(*piece, panel, of_line, first);
       for (const std::size_t d : {0u, 1u}) across[d] += of_line.load / gauss_.weight[j] * highest[d][j];
       sums.add(of_line);
-      a_.shape.push_back({line.base[1 - panel.inner], of_line.area / line.weight, of_line.load / line.weight, std::span<const LineEnd>(a_.end).subspan(line.ends.begin, line.ends.size())});
+      const double width = line.weight * stretch_of(panel);
+      a_.shape.push_back({line.base[1 - panel.inner], of_line.area / width, of_line.load / width, std::span<const LineEnd>(a_.end).subspan(line.ends.begin, line.ends.size()), line.missed});
+      panel.open = panel.open || (s_.chart.star() && panel.high[1] >= 1.0 && line.ends.size() > 0 && a_.end[line.ends.end - 1].level == LineEnd::kSide);
     }
     if (!first) {
       panel.off.add(sums, -1.0);
@@ -604,10 +496,12 @@ void Pass::add_up(bool first) {
     panel.points.end = static_cast<std::uint32_t>(a_.point.size());
     panel.sums = panel.off = sums;
     judge_panel(k, {along, std::abs(across[0]) + std::abs(across[1])});
+    panel.missed_area *= stretch_of(panel);
+    panel.missed_load *= stretch_of(panel);
   }
 }
 
-}  // namespace
+}  // namespace panel_pass
 
 void measure_panels(PanelSetting& setting, std::span<Panel> panels, std::span<const std::uint32_t> which, PanelArena& arena) {
   std::vector<std::uint32_t>& rest = arena.compared;
@@ -621,7 +515,7 @@ void measure_panels(PanelSetting& setting, std::span<Panel> panels, std::span<co
       }
       which = rest;
     }
-    Pass pass(setting, panels, which, order, arena);
+    panel_pass::Pass pass(setting, panels, which, order, arena);
     pass.place_lattice();
     if (first) pass.look_at_lattice();
     pass.make_lines();

@@ -5,14 +5,17 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "surface/panels/level_roots.h"
 #include "surface/panels/panel_corners.h"
 #include "surface/panels/panel_levels.h"
+#include "surface/panels/plane_chart.h"
 #include "surface/panels/sigma_rays.h"
 #include "surface/patch_points.h"
+#include "surface/polar/apex.h"
 
 namespace supple::collision {
 
@@ -22,17 +25,18 @@ struct Slice {
   [[nodiscard]] std::size_t size() const { return end - begin; }
 };
 
-/// A box in the frame of the rays. Its panel is the rectangle across the axis along which Sigma is seen.
+/// A box in the frame of the rays. Its panel is the rectangle across the axis along which Sigma is seen; of a star, in its coordinates (PlaneChart).
 struct Panel {
-  std::array<double, 3> low{}, high{};  // [m]
+  std::array<double, 3> low{}, high{};  // [m]; of a star the angle [rad], the share of its reach, and the height [m]
   std::uint8_t along = 2;               // the axis of its rays
   bool reverse = false;                 // which leads out of B into A
   bool walls = false;                   // Sigma counts only between its heights; else it is all there is along the rays
   bool cut = false;                     // lines are parted at kinks
   std::uint8_t inner = 0;               // along which coordinate of the plane lines run
   std::uint8_t depth = 0;
-  bool thirds = false;                  // a third body presses as hard somewhere
+  std::uint64_t thirds = 0;             // by bits, which third bodies press as hard somewhere; the last bit is that of all from there on
   bool steep = false;                   // Sigma is no graph, or may be more than one sheet
+  bool open = false;                    // of a star: the patch reaches beyond it
   Slice levels, guess, nodes, points;   // level numbers; rays to start from; its own; points of its sums
   PatchSums sums, off;                  // by the order asked for; less those by the order below
   double missed_load = 0.0, missed_area = 0.0;  // what it may hold beside its nodes
@@ -48,10 +52,14 @@ struct PanelPoint {
   double cosine;
 };
 
+[[nodiscard]] constexpr std::uint64_t third_bit(std::size_t third) { return std::uint64_t{1} << (third < 63 ? third : 63); }
+
 /// What all panels of a pair share.
 struct PanelSetting {
   SigmaView view;
   Levels levels;
+  PlaneChart chart{};
+  std::array<std::optional<Apex>, 2> apex{};  // that the columns of A, of B come out of
   int order = 3;          // Gauss points along a line, and lines
   double enough = 0.0;    // of a step towards Sigma [m]
   double enough_rim = 0.0;  // of a step along a line over its length
@@ -67,10 +75,11 @@ struct PanelArena {
   // Of one pass over panels.
   struct Line {
     std::uint32_t panel;
-    std::array<double, 2> base, way;  // a place at s: base + s way
+    std::array<double, 2> base;       // a place of it
     double begin, end, weight;
     std::uint32_t first, stride;      // of its rays
     Slice ends;
+    std::optional<LineSlot> missed;
     bool dead;                        // a level is negative all along
   };
   struct Search {
@@ -95,9 +104,35 @@ struct PanelArena {
   std::vector<LineShape> shape;
   std::vector<LevelQuery> query;
   std::vector<LevelValue> value, least;  // of queries; at each ray the level that bounds the patch most, as a pressure
+  /// What third bodies may take of a panel between its lines, and where.
+  struct Hidden {
+    double area = 0.0, load = 0.0, most = 0.0, place = 0.0;
+  };
+  std::vector<Hidden> hidden;  // by panel
+  /// Where a line of a star leaves the patch.
+  struct RimEnd {
+    bool found = false;
+    double drift = 0.0;
+    std::uint32_t ray = 0;                // of `rim_ray`
+    Slice values;                         // of `rim_value`: of the levels that are not the rim, in the panel's order
+    LineSlot missed{};                    // where a third body has the line up to there: by how much
+    bool taken = false;
+  };
+  std::vector<RimEnd> rim;  // by line
+  /// A level where it seems to turn along a line.
+  struct Turn {
+    std::uint32_t line;
+    std::uint16_t level;
+    LevelSample sample;
+  };
+  std::vector<Turn> turn;
+  std::vector<SigmaRay> rim_ray;
+  std::vector<LevelValue> rim_value;
+  std::vector<Search> rim_search;
   std::vector<LevelSample> sample;
   std::vector<LevelRoot> root;
   std::vector<std::uint32_t> open, compared;
+  std::vector<LineSlot> slot;
   std::vector<std::pair<double, std::uint32_t>> event;
   RayScratch rays;
   LevelScratch levels;

@@ -30,6 +30,7 @@ struct RayFrame {
 /// A ray along axis `along`, through `at` in the plane of the two others, and its foot: the place where it meets Sigma.
 struct SigmaRay {
   std::array<double, 2> at{};    ///< along the axes across [m]
+  std::array<double, 2> place{};  ///< the same in the coordinates of the panel that it belongs to
   double height = 0.0;           ///< a guess, then that of the foot [m]
   double low = 0.0, high = 0.0;  ///< between which the foot is sought [m]
   std::array<double, 2> rise{};  ///< of Sigma over the plane [1]

@@ -52,7 +52,7 @@ bool PolarPatches::solve(const PolarJob& job, bool follow, bool& unseen, PairRes
     if (!covered(x, kBesideRim) && add_patch(job, x, follow, out) == Patch::Unfit) return false;
   }
   out.summary.patches = static_cast<std::uint32_t>(cover_count_);
-  if (share_.size() > 1) out.summary.error_estimate = estimate_of_all(out);
+  if (share_.size() > 1) out.summary.error_estimate = estimate_of_all(share_, out);
   return !overlap(job.pressure);
 }
 
@@ -111,12 +111,11 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const StartPoin
   return Patch::Added;
 }
 
-/// Forces of patches may cancel, and each is a lever to the centre of pressure: both are then off by more than any of the patches is.
-double PolarPatches::estimate_of_all(const PairResult& all) const {
+double estimate_of_all(std::span<const PatchShare> patches, const PairResult& all) {
   if (!(all.load > 0.0)) return 1.0;
   const Vec3 centre = all.first / all.load;
   double force = 0.0, area = 0.0, first = 0.0;
-  for (const Share& patch : share_) {
+  for (const PatchShare& patch : patches) {
     if (!(patch.load > 0.0)) continue;  // a third body has all of it
     force += patch.estimate * patch.force.norm();
     area += patch.estimate * patch.area;

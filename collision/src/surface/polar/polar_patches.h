@@ -50,13 +50,7 @@ class PolarPatches {
  private:
   enum class Patch : std::uint8_t { Added, Known, Lost, Unfit };
 
-  /// What one patch adds, and how far it is off.
-  struct Share {
-    Vec3 force = Vec3::Zero(), first = Vec3::Zero();  ///< first moment of its load about the world's origin
-    double load = 0.0, area = 0.0, estimate = 0.0;
-  };
   bool solve(const PolarJob& job, bool follow, bool& unseen, PairResult& out);
-  [[nodiscard]] double estimate_of_all(const PairResult& all) const;
   Patch add_patch(const PolarJob& job, const StartPoint& hill, bool follow, PairResult& out);
   [[nodiscard]] bool overlap(PairPressure& pressure);
   std::optional<StartPoint> outside(PairPressure& pressure, double extent);
@@ -70,7 +64,7 @@ class PolarPatches {
   std::vector<Vec3> from_, point_, before_;
   std::vector<PolarCover> covers_;
   std::size_t cover_count_ = 0;
-  std::vector<Share> share_;
+  std::vector<PatchShare> share_;
   PressureBatch batch_;
 };
 

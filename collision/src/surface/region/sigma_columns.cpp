@@ -10,15 +10,35 @@ namespace {
 
 /// A line from a place of Sigma to where a body ends.
 struct Column {
-  Vec3 from;
+  Vec3 from, way;
   double share;   // of the area across it [m^2]
+  double widens;  // across, over a step along it [1/m]
   double length;  // as far as it is known [m]
   double low, high;
   bool high_seen;
 };
 
-/// Newton's method along the columns for the zero of the body's pressure, safeguarded by halving. @return whether all of them lead out
-bool find_ends(const ColumnJob& job, int side, const Vec3& way, std::vector<Column>& columns) {
+/// The columns of a side, with a guess of their lengths. @return whether they are sure to hold what the body loses, as far as Sigma tells
+bool start_columns(const ColumnJob& job, std::size_t side, std::span<const Panel> panels, std::span<const PanelPoint> sigma, std::vector<Column>& columns) {
+  const std::optional<Apex>& apex = job.apex[side];
+  const double sign = side == 0 ? 1.0 : -1.0;
+  bool sure = true;
+  columns.clear();
+  for (const Panel& panel : panels) {
+    for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
+      const PanelPoint& p = sigma[i];
+      const Vec3 way = apex ? apex->way(p.at) : Vec3(sign * job.way);
+      const double cosine = sign * p.normal.dot(way), fall = p.fall[side];
+      sure = sure && (apex || cosine > kLeastFall);
+      const double guess = fall > 0.0 ? std::min(p.pressure / fall, job.reach) : job.reach;
+      columns.push_back({p.at, way, p.area * cosine, apex ? 1.0 / apex->distance(p.at) : 0.0, guess, 0.0, 0.0, false});
+    }
+  }
+  return sure;
+}
+
+/// Newton's method along the columns for the zero of the body's pressure, safeguarded by halving. @return whether all end, and fall as they should there
+bool find_ends(const ColumnJob& job, int side, double least_fall, std::vector<Column>& columns) {
   constexpr int kMostSteps = 40;
   std::vector<std::size_t> open;
   std::vector<Vec3> point, slope;
@@ -27,14 +47,14 @@ bool find_ends(const ColumnJob& job, int side, const Vec3& way, std::vector<Colu
   bool lead_out = true;
   for (int step = 0; step < kMostSteps && !open.empty(); ++step) {
     point.clear();
-    for (const std::size_t i : open) point.push_back(columns[i].from + columns[i].length * way);
+    for (const std::size_t i : open) point.push_back(columns[i].from + columns[i].length * columns[i].way);
     value.resize(point.size());
     slope.resize(point.size());
     job.pressure.evaluate(side, point, value, slope);
     std::size_t kept = 0;
     for (std::size_t n = 0; n < open.size(); ++n) {
       Column& column = columns[open[n]];
-      const double fall = -slope[n].dot(way);
+      const double fall = -slope[n].dot(column.way);
       const bool inside = value[n] > 0.0;
       (inside ? column.low : column.high) = column.length;
       column.high_seen = column.high_seen || !inside;
@@ -44,7 +64,7 @@ bool find_ends(const ColumnJob& job, int side, const Vec3& way, std::vector<Colu
       const double moved = std::abs(next - column.length);
       column.length = std::max(next, 0.0);
       if (moved <= job.enough) {
-        lead_out = lead_out && fall >= kLeastFall * slope[n].norm();
+        lead_out = lead_out && fall >= least_fall * slope[n].norm();
       } else {
         open[kept++] = open[n];
       }
@@ -54,37 +74,35 @@ bool find_ends(const ColumnJob& job, int side, const Vec3& way, std::vector<Colu
   return lead_out && open.empty();
 }
 
+/// Points along the columns, and the volumes that they stand for.
+void fill_columns(const GaussRule& rule, std::span<const Column> columns, PatchPoints& points) {
+  for (const Column& column : columns) {
+    for (std::size_t k = 0; k < rule.node.size(); ++k) {
+      const double along = rule.node[k] * column.length, wide = 1.0 + along * column.widens;
+      points.volume_point.push_back(column.from + along * column.way);
+      points.volume_weight.push_back(rule.weight[k] * column.length * column.share * wide * wide);
+    }
+  }
+}
+
 }  // namespace
 
 void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<const PanelPoint> sigma, PatchPoints& points) {
-  const GaussRule& rule = gauss_rule(job.order);
+  constexpr int kMoreAcross = 2;  // Gauss points where columns may go through most of the body
   std::vector<Column> columns;
   std::vector<double> value;
-  for (const int side : {0, 1}) {
-    if (job.regions[static_cast<std::size_t>(side)] == Region::None) continue;
-    const Vec3 way = side == 0 ? job.way : Vec3(-job.way);
-    columns.clear();
-    bool sure = true;
-    for (const Panel& panel : panels) {
-      for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
-        const PanelPoint& p = sigma[i];
-        const double cosine = p.normal.dot(job.way), fall = p.fall[static_cast<std::size_t>(side)];
-        sure = sure && cosine > kLeastFall;
-        columns.push_back({p.at, p.area * cosine, fall > 0.0 ? std::min(p.pressure / fall, job.reach) : job.reach, 0.0, 0.0, false});
-      }
-    }
-    sure = find_ends(job, side, way, columns) && sure;
+  for (const std::size_t side : {0u, 1u}) {
+    if (job.regions[side] == Region::None) continue;
+    const std::optional<Apex>& apex = job.apex[side];
+    const bool begun = start_columns(job, side, panels, sigma, columns);
+    const bool sure = find_ends(job, static_cast<int>(side), apex ? 0.0 : kLeastFall, columns) && begun;
     points.unsure[side] = points.unsure[side] || !sure;
     if (!sure) continue;
     const std::size_t begin = points.volume_point.size();
-    for (const Column& column : columns) {
-      for (std::size_t k = 0; k < rule.node.size(); ++k) {
-        points.volume_point.push_back(column.from + rule.node[k] * column.length * way);
-        points.volume_weight.push_back(rule.weight[k] * column.length * column.share);
-      }
-    }
-    add_to_region(job.pressure, side, begin, value, points);
-    if (job.regions[static_cast<std::size_t>(side)] == Region::Points) continue;
+    fill_columns(gauss_rule(apex ? job.order + kMoreAcross : job.order), columns, points);
+    if (apex && apex->lost) fill_body(job.pressure, static_cast<int>(side), apex->at, job.error, points.volume_point, points.volume_weight);
+    add_to_region(job.pressure, static_cast<int>(side), begin, value, points);
+    if (job.regions[side] == Region::Points) continue;
     points.volume_point.resize(begin);
     points.volume_weight.resize(begin);
     points.volume_side.resize(begin);
