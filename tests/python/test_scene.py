@@ -72,7 +72,7 @@ class Errors(unittest.TestCase):
         # The first by place, which is line 7, the mass of `left`.
         self.assertEqual(error.place, "two_drops.yaml:7:79")
         self.assertEqual(error.key, "objects[0].particles.mass")
-        self.assertEqual((error.expected, error.found), ("expected a mass > 0 [kg]", "-1"))
+        self.assertEqual((error.expected, error.found), ("expected a mass > 0 [kg], or auto", "-1"))
         hints = [fault.hint for fault in error.faults if fault.key.endswith("raduis")]
         self.assertEqual(len(hints), 1)
         self.assertIn("did you mean 'radius'?", hints[0])

@@ -157,7 +157,8 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   const double error = job.settings().error;
   const bool star = stars_cut(job, std::max(error, kFinestStar), out), coarse = error >= kFinestStar;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
-  if (star && coarse && !small && (out.points.point.empty() || meets(out, error))) return true;
+  const bool unsure = out.points.unsure[0] || out.points.unsure[1];  // of what a body loses that is not known to be convex
+  if (star && coarse && !small && !unsure && (out.points.point.empty() || meets(out, error))) return true;
   std::swap(kept_, out);
   out.summary.bodies = job.pair;
   if (!imprints_cut(job, out)) return false;

@@ -35,8 +35,7 @@ void DampingTerm::begin(const ParticleSet& set, const Interactions& interactions
   start_ = &start;
   h_ = h;
   midpoint_ = midpoint;
-  pair_.clear();
-  coupled_.clear();
+  clear();
   double z = 0.0;
   for_each_damping(set, predicted, interactions, [&](std::uint32_t a, std::uint32_t b, const PairHessian& d) {
     Damped damped{.matrix = d};

@@ -22,6 +22,10 @@ class DampingTerm {
   /// @param predicted  the pose that D belongs to  @param h  from the start to the pose that the step solves for [s]
   void begin(const ParticleSet& set, const Interactions& interactions, const ParticleState& start, const ParticleState& predicted, double h,
              bool midpoint);
+  void clear() {
+    pair_.clear();
+    coupled_.clear();
+  }
   [[nodiscard]] bool empty() const { return pair_.empty(); }
   /// The two particles of each pair.
   [[nodiscard]] const std::vector<std::pair<std::uint32_t, std::uint32_t>>& coupled() const { return coupled_; }

@@ -340,12 +340,12 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   buffers.start = state;
   buffers.contact.begin(set, buffers.points, buffers.start, buffers.flight, {.h = h, .end_factor = midpoint ? 2.0 : 1.0, .slip_factor = midpoint ? kSlipFactor : 1.0},
                         problem.contact != nullptr ? SlowSlip{problem.contact->stick_speed, problem.contact->slow_slip} : SlowSlip{});
-
-  buffers.damping.begin(set, interactions, buffers.start, buffers.flight, h, midpoint);
+  buffers.damping.clear();
 
   StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
-  // Stiff bonds make free flight a bad first guess: the pose before the step may be a better one.
+  // Stiff bonds make free flight a bad first guess, and a bad pose for the matrices of damping: the pose before the step may be a better one.
   buffers.pose = potential.value(buffers.flight) <= potential.value(state) ? buffers.flight : state;
+  buffers.damping.begin(set, interactions, buffers.start, buffers.pose, h, midpoint);
   minimise(settings, potential, buffers, report);
 
   const ParticleState& start = buffers.start;

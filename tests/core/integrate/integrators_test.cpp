@@ -618,7 +618,8 @@ Vec3 end_of_pulled_spiral(const Method& method, double dt) {
   System s = make_sluggish_spiral(method);
   InteractionWorkspace pairs(s.p.set, s.interactions);
   const ForceModel forces = [&](const ParticleState& state, double t, ForceSample& out) {
-    accumulate_interactions(s.p.set, state, s.interactions, t, Executor(1), pairs, out.internal, out.external);
+    accumulate_interactions(s.p.set, state, s.interactions, Executor(1), pairs, out.internal);
+    add_external_loads(s.p.set, s.interactions, t, out.external);
     out.external.force[0] = Vec3(0, -2, -1);
     out.external.force[s.p.set.size() - 1] = Vec3(0, 2, 1);
   };

@@ -74,6 +74,17 @@ void add_motion(std::vector<Option>& all) {
   all.push_back(differs("duration", In::Files, {.scene = "output: {particles: csv}", .timing = "duration: $\nframe_rate: 20\n"}, "0.1", "0.2"));
   all.push_back(differs("frame_rate", In::Files, {.scene = "output: {particles: csv}", .timing = "duration: 0.2\nframe_rate: $\n"}, "10", "20"));
   in_scene("gravity", "gravity: $", "[0, 0, 0]", "[0, 0, -9.81]");
+  const std::string gravity = "gravity: [0, 0, -9.81]\n", drag = "medium: {linear: 1}";
+  in_scene("gravity_course.expression", gravity + "gravity_course: {expression: \"$\"}", "1", "t / (1 s)");
+  in_scene("gravity_course.keys.time", gravity + "gravity_course: {keys: [{time: 0, factor: 1}, {time: $, factor: 2}]}", "0.1", "0.2");
+  in_scene("gravity_course.keys.factor", gravity + "gravity_course: {keys: [{time: 0, factor: $}]}", "1", "2");
+  const auto in_wind = [&](const std::string& key, const std::string& scene, const std::string& one, const std::string& other) {
+    all.push_back(differs("wind." + key, In::State, {.object = drag, .scene = "wind: {" + scene + "}"}, one, other));
+  };
+  in_wind("velocity", "velocity: $", "[1, 0, 0]", "[2, 0, 0]");
+  in_wind("course.expression", "velocity: [1, 0, 0], course: {expression: \"$\"}", "1", "t / (1 s)");
+  in_wind("course.keys.time", "velocity: [1, 0, 0], course: {keys: [{time: 0, factor: 1}, {time: $, factor: 2}]}", "0.1", "0.2");
+  in_wind("course.keys.factor", "velocity: [1, 0, 0], course: {keys: [{time: 0, factor: $}]}", "1", "2");
   all.push_back(differs("planar", In::State,
                         {.particles = "arrange: line, count: 5, spacing: 0.2, spin: [0, 0, 3]",
                          .object = "loads: [{particle: 2, force: [0, 0, 1]}]",
@@ -104,7 +115,9 @@ void add_arrangements(std::vector<Option>& all) {
   for (const auto& [name, rest] : std::map<std::string, std::string>{
            {"line", "count: 3, spacing: 0.2"}, {"ring", "count: 5, radius: 0.4"}, {"grid", "columns: 2, rows: 2, spacing: 0.2"},
            {"spiral", "count: 6, inner_radius: 0.1, outer_radius: 0.3"}, {"file", "file: points.csv"},
-           {"geodesic", "frequency: 1, radius: 0.3"}}) {
+           {"geodesic", "frequency: 1, radius: 0.3"}, {"ball", "radius: 0.2, spacing: 0.1"}, {"tube", "radius: 0.2, length: 0.4, spacing: 0.1"},
+           {"curve", "count: 4, points: [[0, 0, 0], [1, 0, 0], [1, 1, 0]]"}, {"scatter", "count: 3, size: [1, 1, 1], spacing: 0.1"},
+           {"fill", "file: block.obj, spacing: 0.2"}}) {
     arranged("arrange=" + name, "$", single, "arrange: " + name + ", " + rest);
   }
   arranged("count", "arrange: line, count: $, spacing: 0.2", "3", "4");
@@ -118,6 +131,13 @@ void add_arrangements(std::vector<Option>& all) {
   arranged("rows", "arrange: grid, columns: 2, rows: $, spacing: 0.2", "2", "3");
   arranged("layers", "arrange: grid, columns: 2, rows: 2, layers: $, spacing: 0.2", "1", "2");
   arranged("file", "arrange: file, file: $", "points.csv", "more_points.csv");
+  all.push_back(differs("objects.particles.own_normal", In::State,
+                        {.particles = "arrange: grid, columns: 2, rows: 2, spacing: 0.2, disorder: 0.03, own_normal: $",
+                         .interactions = "{law: coplanarity, within: 0.25, strength: 5}"}, "[0, 0, 1]", "[0, 1, 1]"));
+  arranged("length", "arrange: tube, radius: 0.2, length: $, spacing: 0.1", "0.3", "0.6");
+  arranged("points", "arrange: curve, count: 4, points: $", "[[0, 0, 0], [1, 0, 0]]", "[[0, 0, 0], [1, 1, 0]]");
+  arranged("size", "arrange: scatter, count: 3, size: $, spacing: 0.1", "[1, 1, 1]", "[1, 2, 1]");
+  arranged("seed", "arrange: scatter, count: 3, size: [1, 1, 1], spacing: 0.1, seed: $", "1", "2");
   arranged("normal=radial", "arrange: ring, count: 5, radius: 0.3, normal: $", "axis", "radial");
   arranged("disorder", "arrange: line, count: 3, spacing: 0.2, disorder: $", "0", "0.01");
   arranged("at", "arrange: single, at: $", "[0, 0, 0]", "[0, 0, 1]");
@@ -246,6 +266,12 @@ void add_object_rules(std::vector<Option>& all) {
   in_object("breaking.couple", "breaking: {force: 60$}" + pull, "", ", couple: 0.5");
   in_object("yielding.energy", "$" + pull, "yielding: {energy: 1e9}", "yielding: {energy: 0.01}");
   in_object("yielding.time", "yielding: {energy: 0.01, time: $}" + pull, "0", "1");
+  const std::string turned = "loads: [{particle: 0, force: [40, 0, 5]}]\n    cuts: ";
+  in_object("cuts.time", turned + "[{time: $, particles: [0, 1]}]", "0.05", "0.15");
+  in_object("cuts.particles", turned + "[{time: 0.05, particles: $}]", "[0, 1]", "[1, 2]");
+  in_object("cuts.at", turned + "[{time: 0.05, at: $, normal: [1, 0, 0]}]", "[-0.3, 0, 0]", "[0.1, 0, 0]");
+  in_object("cuts.normal", turned + "[{time: 0.05, at: [0.1, 0, 0], normal: $}]", "[1, 0, 0]", "[0, 1, 0]");
+  in_object("pins.until", "pins: [{particle: 0$}]", "", ", until: 0.05");
   in_object("pins.particle", "pins: [{particle: $}]", "0", "1");
   in_object("pins.position", "pins: [{particle: 0, position: $}]", "true", "false");
   in_object("pins.orientation", "pins: [{particle: 0, orientation: $}]", "true", "false");
@@ -254,6 +280,9 @@ void add_object_rules(std::vector<Option>& all) {
   in_object("loads.torque", "loads: [{particle: 0, torque: $}]", "[0, 0, 1]", "[0, 1, 1]");
   in_object("loads.from", "loads: [{particle: 0, force: [0, 0, 1], from: $}]", "0", "0.05");
   in_object("loads.until", "loads: [{particle: 0, force: [0, 0, 1]$}]", "", ", until: 0.05");
+  in_object("loads.course.expression", "loads: [{particle: 0, force: [0, 0, 1], course: {expression: \"$\"}}]", "1", "t / (1 s)");
+  in_object("loads.course.keys.time", "loads: [{particle: 0, force: [0, 0, 1], course: {keys: [{time: 0, factor: 1}, {time: $, factor: 2}]}}]", "0.1", "0.2");
+  in_object("loads.course.keys.factor", "loads: [{particle: 0, force: [0, 0, 1], course: {keys: [{time: 0, factor: $}]}}]", "1", "2");
   in_object("loads.ramp", "loads: [{particle: 0, force: [0, 0, 1], ramp: $}]", "0", "0.05");
   const auto volume = [&](const std::string& key, const std::string& one, const std::string& other) {
     all.push_back(differs("objects.volume." + key, In::State,
@@ -271,6 +300,23 @@ void add_object_rules(std::vector<Option>& all) {
   volume("target", "auto", "0.2");
   volume("rate", "2", "20");
   volume("damping", "0.05", "0.1");
+  const auto of_material = [&](const std::string& key, const std::string& one, const std::string& other) {
+    std::string material = "youngs_modulus: 1e4, density: 1000, poissons_ratio: 0.2, damping_ratio: 0.05, friction: 0.5";
+    const std::size_t at = material.find(key + ": ") + key.size() + 2, end = std::min(material.find(',', at), material.size());
+    material.replace(at, end - at, "$");
+    const bool touches = key == "friction";
+    all.push_back(differs("objects.material." + key, In::State,
+                          {.particles = "arrange: grid, columns: 3, rows: 3, layers: 3, spacing: 0.1, velocity: [1, 0, 0]", .interactions = "",
+                           .skeleton = "{shape: point, kernel: {radius: 0.15}}",
+                           .object = "material: {" + material + "}\n    loads: [{particle: 0, force: [3, 0, 2]}]" + (touches ? "\n    contact: {}" : ""),
+                           .scene = touches ? "gravity: [0, 0, -9.81]\nground: {height: -0.17, friction: 1}" : ""},
+                          one, other));
+  };
+  of_material("youngs_modulus", "1e4", "2e4");
+  of_material("density", "1000", "1100");
+  of_material("poissons_ratio", "0.1", "0.2");
+  of_material("damping_ratio", "0.05", "0.1");
+  of_material("friction", "0.1", "0.5");
 }
 
 void add_surfaces(std::vector<Option>& all) {
@@ -724,7 +770,7 @@ void walk(const nlohmann::json& node, const std::string& path, const Use& use) {
 
 TEST_F(Options, AreAllTried) {
   // One number that is always 1, names, and the name that a single camera has not.
-  const std::set<std::string> exempt = {"schema", "title", "objects.name", "obstacles.name", "camera.name", "include", "variables", "defaults"};
+  const std::set<std::string> exempt = {"schema", "title", "objects.name", "obstacles.name", "camera.name", "include", "variables", "defaults", "materials"};
   std::set<std::string> tried;
   for (const Option& option : all_options()) {
     tried.insert(option.key);

@@ -376,7 +376,7 @@ TEST(SceneReference, SchemaSaysWhatIsRequiredAndForWhich) {
   EXPECT_EQ(particles["additionalProperties"], false);
   bool ring = false;
   for (const auto& condition : particles["allOf"]) {
-    ring = ring || (condition["if"]["properties"]["arrange"]["enum"] == nlohmann::json({"ring", "geodesic"}) &&
+    ring = ring || (condition["if"]["properties"]["arrange"]["enum"] == nlohmann::json({"ring", "geodesic", "ball", "tube"}) &&
                     condition["then"]["required"] == nlohmann::json({"radius"}));
   }
   EXPECT_TRUE(ring);
