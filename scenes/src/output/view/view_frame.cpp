@@ -1,4 +1,4 @@
-#include "output/view_frame.h"
+#include "output/view/view_frame.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "output/camera.h"
 #include "output/picture.h"
-#include "output/view_arrays.h"
+#include "output/view/view_arrays.h"
 #include "supple/core/integrate.h"
 #include "supple/scenes/contact_report.h"
 #include "supple/scenes/probe.h"

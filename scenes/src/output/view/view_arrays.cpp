@@ -1,4 +1,4 @@
-#include "output/view_arrays.h"
+#include "output/view/view_arrays.h"
 
 #include <libdeflate.h>
 
