@@ -76,7 +76,7 @@ void add_missed_accuracy(const Scene& scene, const StageErrors& errors, std::vec
   const bool by_time = errors.time.share >= errors.contact.share;
   const ErrorEstimate& worst = by_time ? errors.time : errors.contact;
   if (!(worst.share > *scene.accuracy)) return;
-  warnings.push_back("accuracy: " + std::string(by_time ? "time steps" : "contact") + " displace '" + worst.object + "' by about " +
+  warnings.push_back("accuracy: " + std::string(by_time ? "errors of time steps" : "errors of contact") + " displace '" + worst.object + "' by about " +
                      short_text(worst.position) + " m at the end of the run, " + short_text(worst.share) + " of its size, more than the accuracy " +
                      number_text(*scene.accuracy) + "; use a larger accuracy or a smaller " + (by_time ? "time_step.size" : "contact.error"));
 }
