@@ -133,7 +133,7 @@ function(supple_test module)
   set(source_dir ${PROJECT_SOURCE_DIR}/tests/support/source_dir.cpp)
   set_source_files_properties(${source_dir} PROPERTIES
     COMPILE_DEFINITIONS SUPPLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SKIP_PRECOMPILE_HEADERS ON)
-  add_executable(${module}_tests ${arg_SOURCES} ${source_dir})
+  add_executable(${module}_tests ${arg_SOURCES} ${source_dir} ${PROJECT_SOURCE_DIR}/tests/support/temp_folder.cpp)
   target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${module}_tests PRIVATE supple::${module} ${arg_LIBRARIES} supple_flags GTest::gtest_main)
   # Tests take two thirds of the compiler's time with -O1, and about as long when they run: what they call is optimised.
@@ -141,7 +141,7 @@ function(supple_test module)
   supple_precompile(${module}_tests supple_test_headers OFF "supple::core;GTest::gtest_main" <gtest/gtest.h> <filesystem> <fstream> <sstream>)
   file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/tests-tmp)  # two builds may test at the same time
   gtest_discover_tests(${module}_tests
-    PROPERTIES LABELS ${module} ENVIRONMENT TEST_TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT 600)
+    PROPERTIES LABELS ${module} ENVIRONMENT TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT 600)
 endfunction()
 
 # Installs the CMake package, scenes, documents and licence; each library installs itself.

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <array>
 #include <filesystem>
@@ -11,13 +10,14 @@
 
 #include "supple/core/error.h"
 #include "supple/render/image.h"
+#include "support/temp_folder.h"
 
 namespace supple::render::test {
 
 /// An empty folder that is removed at the end.
 class Folder {
  public:
-  Folder() : path_(std::filesystem::temp_directory_path() / ("supple_render_" + std::to_string(::getpid()))) {
+  Folder() : path_(temp_folder() / "render") {
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }

@@ -14,7 +14,7 @@ def of_tests(program, pattern, context, asked):
     """Tests of GoogleTest by a pattern of names. Counts tests."""
     outcome = Outcome()
     ended = run_process([context.bin / program, "--gtest_filter=" + pattern, "--gtest_brief=1"], timeout=LONG_S,
-                        env={"TEST_TMPDIR": str(context.folder("gtest"))})
+                        env={"TMPDIR": str(context.folder("gtest"))})
     found = re.search(r"(\d+) tests? from \d+ test suites? ran", ended.out)
     outcome.reached = int(found.group(1)) if found else 0
     outcome.faults = re.findall(r"^\[  FAILED  \] (\S+)", ended.out, re.MULTILINE)

@@ -90,23 +90,20 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   if (results.size() < std::min(pairs, kPortion)) results.resize(std::min(pairs, kPortion));
   begins.resize(kPortion / kBlock);
   struct Job {
-    std::span<const ContactBody> bodies;
-    const ContactCandidates& candidates;
-    const ContactSettings& settings;
-    const Partners& partners;
+    ContactQuery query;
     std::span<Box> boxes;
     std::vector<PairResult>& results;
     std::vector<Extent>& begins;
     ContactSurface& out;
     std::size_t first;
     [[nodiscard]] std::array<bool, 2> parted(std::size_t k) const {
-      const BodyPair& pair = candidates.pair[first + k];
-      return {bodies[pair.a].pose.size() > 1, bodies[pair.b].pose.size() > 1};
+      const BodyPair& pair = query.candidates.pair[first + k];
+      return {query.bodies[pair.a].pose.size() > 1, query.bodies[pair.b].pose.size() > 1};
     }
-  } job{bodies, candidates, settings, partners, boxes, results, begins, out, 0};
+  } job{{bodies, candidates, partners, boxes, settings}, boxes, results, begins, out, 0};
   constexpr std::size_t kBodies = 64;
   executor.for_blocks(bodies.size(), kBodies, [&job](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) job.boxes[i] = job.bodies[i].field ? job.bodies[i].field.surface_box() : Box{};
+    for (std::size_t i = begin; i < end; ++i) job.boxes[i] = job.query.bodies[i].field ? job.query.bodies[i].field.surface_box() : Box{};
   });
   Extent size;
   for (; job.first < pairs; job.first += kPortion) {
@@ -115,7 +112,7 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
       thread_local PairSolver solver;
       Extent block;
       for (std::size_t k = begin; k < end; ++k) {
-        solver.solve(job.bodies, job.candidates, job.partners, job.boxes, job.first + k, job.settings, job.results[k]);
+        solver.solve(job.query, job.first + k, job.results[k]);
         block += extent_of(job.results[k], job.parted(k));
       }
       job.begins[begin / kBlock] = block;

@@ -85,7 +85,7 @@ void PairSolver::find_thirds(const Job& job, const BodyPair& pair, const Partner
     const std::span<const std::uint32_t> all = partners.of(body);
     return std::binary_search(all.begin(), all.end(), c);
   };
-  thirds_.set(job.bodies, job.a, job.b, pair, third_, teams_, meets);
+  thirds_.set(job.bodies, {job.a, job.b, pair}, third_, teams_, meets);
 }
 
 /// The team of the pair's obstacle, if it has one. @return whether the pair has its contact
@@ -314,7 +314,7 @@ bool PairSolver::samples(const Job& job, bool few, PairResult& out) {
   const SampleRuleSolver::Limits limits{settings.error, settings.max_refinement, settings.only == ContactRule::Samples ? kMostRays : kRays,
                                         few ? kAsMarching : kAny};
   return solve_in_order(job, samples_, ContactRule::Samples, [&](const Regions& regions, const Vec3& reference) {
-    return samples_.solve(pressure, third_bodies_, job.overlap, first, limits, regions, reference, out.points);
+    return samples_.solve({pressure, third_bodies_, job.overlap, regions, reference, first, limits}, out.points);
   }, out);
 }
 
@@ -324,7 +324,7 @@ bool PairSolver::march(const Job& job, PairResult& out) {
   return solve_in_order(job, march_, ContactRule::March, [&](const Regions& regions, const Vec3& reference) {
     const bool alone = settings.symmetry && third_bodies_.empty();
     const std::optional<CommonAxis> axis = alone ? axis_of_symmetry(pressure.body(0), pressure.body(1), job.overlap) : std::nullopt;
-    return march_.solve(pressure, third_bodies_, job.overlap, {settings.error, settings.max_refinement}, regions, axis, reference, out.points);
+    return march_.solve({pressure, third_bodies_, job.overlap, regions, reference, axis, {settings.error, settings.max_refinement}}, out.points);
   }, out);
 }
 
@@ -518,8 +518,8 @@ void PairSolver::find_patches(const Job& job, std::span<const Vec3> seeds) {
   }
 }
 
-void PairSolver::solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
-                       std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out) {
+void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out) {
+  const auto& [bodies, candidates, partners, boxes, settings] = query;
   const BodyPair pair = candidates.pair[k];
   out.summary.bodies = pair;
   out.clear();

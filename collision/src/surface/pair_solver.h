@@ -28,12 +28,20 @@ struct Partners {
   }
 };
 
+/// What is asked of all pairs.
+struct ContactQuery {
+  std::span<const ContactBody> bodies;
+  const ContactCandidates& candidates;
+  const Partners& partners;
+  std::span<const Box> boxes;  ///< of the bodies' surfaces
+  const ContactSettings& settings;
+};
+
 /// The solver of one thread; its buffers are reused.
 class PairSolver {
  public:
-  /// @param boxes  of the bodies' surfaces   @param k  of the candidate pairs
-  void solve(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners,
-             std::span<const Box> boxes, std::size_t k, const ContactSettings& settings, PairResult& out);
+  /// @param k  of the candidate pairs
+  void solve(const ContactQuery& query, std::size_t k, PairResult& out);
 
  private:
   /// A pair as the rules need it.

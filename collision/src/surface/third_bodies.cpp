@@ -217,8 +217,7 @@ const Team* Teams::of(std::uint32_t obstacle) const {
   return nullptr;
 }
 
-void ThirdBodies::set(std::span<const ContactBody> bodies, const ContactBody& a, const ContactBody& b, const BodyPair& pair,
-                      std::span<const std::uint32_t> index, const Teams& teams, const Meets& meets) {
+void ThirdBodies::set(std::span<const ContactBody> bodies, const Pair& pair, std::span<const std::uint32_t> index, const Teams& teams, const Meets& meets) {
   third_.clear();
   rival_.clear();
   rival_.reserve(index.size());  // they must stay where they are
@@ -226,10 +225,10 @@ void ThirdBodies::set(std::span<const ContactBody> bodies, const ContactBody& a,
     const Team* team = teams.of(c);
     ContactBody& third = third_.emplace_back(team != nullptr ? team->body : bodies[c]);
     for (const bool with_a : {true, false}) {
-      const ContactBody &own = with_a ? a : b, &other = with_a ? b : a;
+      const ContactBody &own = with_a ? pair.a : pair.b, &other = with_a ? pair.b : pair.a;
       const bool same = third.fixed && own.fixed;
-      if (!meets(with_a ? pair.b : pair.a, c) || (!same && !coincide(third, own))) continue;
-      third.field = rival_.emplace_back(third, own, c < (with_a ? pair.a : pair.b), other.field);
+      if (!meets(with_a ? pair.number.b : pair.number.a, c) || (!same && !coincide(third, own))) continue;
+      third.field = rival_.emplace_back(third, own, c < (with_a ? pair.number.a : pair.number.b), other.field);
       break;
     }
   }

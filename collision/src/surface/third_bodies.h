@@ -103,10 +103,13 @@ class Teams {
 /// The third bodies of one pair; buffers are reused.
 class ThirdBodies {
  public:
-  /// @param a, b  of the pair   @param pair  their numbers   @param index  of the third bodies, rising
-  /// @param teams  for which their first ones stand
-  void set(std::span<const ContactBody> bodies, const ContactBody& a, const ContactBody& b, const BodyPair& pair, std::span<const std::uint32_t> index,
-           const Teams& teams, const Meets& meets);
+  /// The bodies of a pair and their numbers.
+  struct Pair {
+    const ContactBody &a, &b;
+    BodyPair number;
+  };
+  /// @param index  of the third bodies, rising   @param teams  for which their first ones stand
+  void set(std::span<const ContactBody> bodies, const Pair& pair, std::span<const std::uint32_t> index, const Teams& teams, const Meets& meets);
   [[nodiscard]] std::span<const ContactBody> all() const { return third_; }
 
  private:

@@ -234,8 +234,18 @@ void expect_filled(double beyond, const std::string& key, ModelFaults& faults) {
              "enlarge the kernel's radius, or reduce 'spacing'");
 }
 
-Slenderness add_block(const SubstanceDesc& d, const Lattice& lattice, double spacing, double volume, const std::string& key, MaterialBonds& out,
-                      ModelFaults& faults) {
+/// Particles on a lattice and the material that they carry.
+struct FilledLattice {
+  const SubstanceDesc& material;
+  const Lattice& lattice;
+  double spacing;  ///< [m]
+  double volume;   ///< that the surface encloses [m^3]
+};
+
+Slenderness add_block(const FilledLattice& body, const std::string& key, MaterialBonds& out, ModelFaults& faults) {
+  const SubstanceDesc& d = body.material;
+  const Lattice& lattice = body.lattice;
+  const double spacing = body.spacing, volume = body.volume;
   Vec3 extent;
   for (std::size_t axis = 0; axis < 3; ++axis) extent[static_cast<Eigen::Index>(axis)] = spacing * (lattice.count[axis] - 1);
   const double beyond = extent.prod() < volume ? root_of_rising(std::cbrt(volume), [&](double b) { return (extent + Vec3::Constant(2.0 * b)).prod() - volume; }) : 0.0;
@@ -256,8 +266,10 @@ Slenderness add_block(const SubstanceDesc& d, const Lattice& lattice, double spa
 
 /// Of a sheet: stiffness along solves E h = (C11^2 - C12^2) / C11 with C11 = (3 k_n + k_t) / 2, C12 = (k_n - k_t) / 2. In bending, curvatures k1 and k2 cost
 /// (x (k1^2 + k2^2) + q k1 k2) / 2 with q = k_t s^2 / 2 and x = 4 k_theta + q, so a strip with free edges has the stiffness x - q^2 / 4x, which is to be E h^3 / 12.
-Slenderness add_sheet(const SubstanceDesc& d, const Lattice& lattice, double spacing, double volume, const std::string& key, MaterialBonds& out,
-                      ModelFaults& faults) {
+Slenderness add_sheet(const FilledLattice& body, const std::string& key, MaterialBonds& out, ModelFaults& faults) {
+  const SubstanceDesc& d = body.material;
+  const Lattice& lattice = body.lattice;
+  const double spacing = body.spacing, volume = body.volume;
   Vec3 extent = Vec3::Zero();
   for (std::size_t axis = 0; axis < 3; ++axis) extent[static_cast<Eigen::Index>(axis)] = spacing * (lattice.count[axis] - 1);
   const double h = root_of_rising(std::cbrt(volume), [&](double thickness) {
@@ -361,12 +373,13 @@ void add_material_laws(const ObjectDesc& d, const ObjectModel& object, const std
   const Lattice lattice = lattice_of(d.particles);
   MaterialBonds bonds(object, model);
   const double volume = object.solid_volume;
+  const FilledLattice filled{*d.material, lattice, d.particles.spacing, volume};
   Slenderness body;
   const bool solid = d.particles.arrange == ArrangeKind::Ball || d.particles.arrange == ArrangeKind::Fill;
   switch (solid ? 0 : lattice.directions()) {
     case 0: body = add_solid(d, object, model, key, bonds, faults); break;
-    case 3: body = add_block(*d.material, lattice, d.particles.spacing, volume, key, bonds, faults); break;
-    case 2: body = add_sheet(*d.material, lattice, d.particles.spacing, volume, key, bonds, faults); break;
+    case 3: body = add_block(filled, key, bonds, faults); break;
+    case 2: body = add_sheet(filled, key, bonds, faults); break;
     default: body = add_rod(d, object, model, volume, bonds); break;
   }
   bonds.give(model.interactions);

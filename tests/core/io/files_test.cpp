@@ -2,7 +2,6 @@
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +18,7 @@
 #include "supple/core/io/usd_file.h"
 #include "supple/core/io/vtk_files.h"
 #include "support/broken_calls.h"
+#include "support/temp_folder.h"
 
 namespace {
 
@@ -28,9 +28,7 @@ namespace fs = std::filesystem;
 /// An empty folder that goes with the test.
 class Files : public testing::Test {
  protected:
-  Files()
-      : folder_(fs::temp_directory_path() / ("supple_core_files_" + std::to_string(::getpid()) + '_' +
-                                             testing::UnitTest::GetInstance()->current_test_info()->name())) {
+  Files() : folder_(temp_folder() / testing::UnitTest::GetInstance()->current_test_info()->name()) {
     fs::create_directories(folder_);
   }
   ~Files() override { fs::remove_all(folder_); }

@@ -2,12 +2,12 @@
 #include "supple/core/io/particle_files.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <string>
 
 #include "supple/core/error.h"
+#include "support/temp_folder.h"
 
 namespace supple::io {
 namespace {
@@ -30,7 +30,7 @@ class ParticleFiles : public testing::Test {
     }
     return "accepted";
   }
-  fs::path folder_ = fs::temp_directory_path() / ("particle_files_" + std::to_string(getpid()));
+  fs::path folder_ = temp_folder() / "particle_files";
 };
 
 TEST_F(ParticleFiles, HoldPlacesAlone) {

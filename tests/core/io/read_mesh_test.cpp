@@ -9,10 +9,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include <unistd.h>
 
 #include "supple/core/error.h"
 #include "supple/core/io/mesh_files.h"
+#include "support/temp_folder.h"
 
 namespace supple::io {
 namespace {
@@ -36,7 +36,7 @@ class ReadMesh : public testing::Test {
       EXPECT_NE(std::string(error.what()).find(message), std::string::npos) << error.what();
     }
   }
-  fs::path folder_ = fs::temp_directory_path() / ("supple_read_mesh_" + std::to_string(getpid()));
+  fs::path folder_ = temp_folder() / "read_mesh";
 };
 
 Mesh tetrahedron() {

@@ -17,6 +17,7 @@
 #include "supple/core/mesh.h"
 #include "supple/implicit/march_cubes.h"
 #include "supple/implicit/mesh_routes.h"
+#include "support/temp_folder.h"
 
 // OpenVDB loses one node when the topology of a file ends early: RootNode::readTopology holds it by a plain pointer.
 extern "C" const char* __lsan_default_suppressions();
@@ -40,7 +41,7 @@ Vec3 node(int i, int j, int k) { return kOrigin + kCell * Vec3(i, j, k); }
 /// A folder of this test program, removed at the end.
 class Folder {
  public:
-  Folder() : path_(std::filesystem::temp_directory_path() / ("supple_grid_" + std::to_string(::getpid()))) {
+  Folder() : path_(temp_folder() / "grid") {
     std::filesystem::create_directories(path_);
   }
   ~Folder() { std::filesystem::remove_all(path_); }

@@ -9,6 +9,7 @@
 #include "file/expression.h"
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -89,8 +90,7 @@ class ExpandedScene : public testing::Test {
     return {Fault{}};
   }
 
-  fs::path folder_ = fs::path(std::getenv("TEST_TMPDIR") != nullptr ? std::getenv("TEST_TMPDIR") : "/tmp") /
-                     (std::string("expand_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  fs::path folder_ = temp_folder() / (std::string("expand_") + testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
 constexpr const char* kBalls = R"(

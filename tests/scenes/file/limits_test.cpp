@@ -15,6 +15,7 @@
 #include "supple/scenes/check.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/read_scene.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -60,7 +61,7 @@ TEST(SceneCounts, AreThoseOfTheModel) {
 }
 
 TEST(SceneCounts, OfParticlesInAFileAreThoseOfGenerators) {
-  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "supple_counts";
+  const std::filesystem::path folder = temp_folder() / "counts";
   std::filesystem::create_directories(folder);
   {
     std::ofstream file(folder / "points.csv");

@@ -1,7 +1,6 @@
 /// What a user reads when a scene is wrong, word for word: tests/golden/messages/NAME.yaml and NAME.txt.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -14,6 +13,7 @@
 #include "supple/scenes/model.h"
 #include "supple/scenes/read_scene.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -125,7 +125,7 @@ obstacles:
 }
 
 TEST(Messages, OfPipesDevicesAndFoldersNameTheirKeyAtOnce) {
-  const fs::path place = fs::temp_directory_path() / ("supple_messages_" + std::to_string(::getpid()));
+  const fs::path place = temp_folder() / "messages";
   fs::create_directories(place / "folder");
   ASSERT_EQ(::mkfifo((place / "pipe").c_str(), 0600), 0);
   fs::create_symlink("/dev/zero", place / "device");

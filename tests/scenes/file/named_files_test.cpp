@@ -1,7 +1,6 @@
 #include "file/named_files.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -12,6 +11,7 @@
 #include "supple/scenes/model.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -45,7 +45,7 @@ class SceneFiles : public testing::Test {
     return error.faults().front().found;
   }
 
-  fs::path root_ = fs::temp_directory_path() / ("supple_files_" + std::to_string(::getpid()));
+  fs::path root_ = temp_folder() / "files";
 };
 
 TEST_F(SceneFiles, AreInItsFolderWhereverLinksLead) {

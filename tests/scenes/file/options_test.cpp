@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include <unistd.h>
 
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -19,6 +18,7 @@
 #include "supple/scenes/run.h"
 #ifdef SUPPLE_HAS_CGAL
 #include "supple/cgal/surface_meshes.h"
+#include "support/temp_folder.h"
 #endif
 
 namespace supple::scenes {
@@ -652,7 +652,7 @@ std::vector<Option> all_options() {
 class Options : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder() = fs::path(testing::TempDir()) / ("options_" + std::to_string(::getpid()));
+    folder() = temp_folder() / "options";
     fs::create_directories(folder());
     const auto write = [](const char* name, const std::string& text) { std::ofstream(folder() / name) << text; };
     write("points.csv", "x,y,z\n0,0,0\n0.2,0,0\n");

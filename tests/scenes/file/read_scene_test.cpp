@@ -14,6 +14,7 @@
 #include "file/yaml_quantity.h"
 #include "supple/core/error.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -385,7 +386,7 @@ TEST(SceneReference, SchemaSaysWhatIsRequiredAndForWhich) {
 }
 
 TEST(SceneHashes, KnowWhatIsInTheFilesThatAreNamed) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "scene_hashes";
+  const std::filesystem::path folder = temp_folder() / "scene_hashes";
   std::filesystem::create_directories(folder);
   const auto read = [&](const std::string& points, const std::string& picture) {
     std::ofstream(folder / "points.csv") << points;

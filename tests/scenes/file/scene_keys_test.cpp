@@ -11,6 +11,7 @@
 #include "scenes/run_scenes.h"
 #include "scenes/small_scenes.h"
 #include "supple/core/error.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -170,7 +171,7 @@ TEST(SceneKeys, OfPicturesKnowNoFormatsAndNoDurationWithoutATurntable) {
 }
 
 TEST(SceneKeys, KnowAFileByItsContent) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "scene_keys";
+  const std::filesystem::path folder = temp_folder() / "scene_keys";
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "one.csv") << "x,y,z\n0,0,0\n";
   std::ofstream(folder / "same.csv") << "x,y,z\n0,0,0\n";

@@ -13,6 +13,7 @@
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -223,7 +224,7 @@ TEST(ImplicitMethod, SpinsUpABallFasterThanToFirstOrder) {
 }
 
 nlohmann::json errors_of(const std::string& text) {
-  const fs::path folder = fs::path(testing::TempDir()) / "accuracy_errors";
+  const fs::path folder = temp_folder() / "accuracy_errors";
   fs::remove_all(folder);
   const RunResult done = run_scene(read(text), {.folder = folder, .threads = 1});
   EXPECT_EQ(done.outcome, "done") << done.reason;

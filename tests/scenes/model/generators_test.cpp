@@ -1,6 +1,5 @@
 /// Arrangements of scene files: filled meshes, curves, scattered particles, files.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -10,6 +9,7 @@
 #include "supple/core/error.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/read_scene.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -32,7 +32,7 @@ class Generators : public testing::Test {
     }
     return "accepted";
   }
-  fs::path folder_ = fs::temp_directory_path() / ("generators_" + std::to_string(getpid()));
+  fs::path folder_ = temp_folder() / "generators";
 };
 
 constexpr const char* kCube = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n"

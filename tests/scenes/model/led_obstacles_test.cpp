@@ -7,6 +7,7 @@
 
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -81,7 +82,7 @@ objects:
 }
 
 TEST(LedObstacles, OfEveryShapePressABallBetweenThemAndTheGround) {
-  const fs::path folder = fs::temp_directory_path() / "supple_led";
+  const fs::path folder = temp_folder() / "led";
   fs::create_directories(folder);
   std::ofstream(folder / "flat.csv") << "x,y,z\n-1,-1,0\n1,-1,0\n-1,1,0\n1,1,0\n";
   std::ofstream slab(folder / "slab.obj");

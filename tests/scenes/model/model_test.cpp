@@ -1,7 +1,6 @@
 #include "supple/scenes/model.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include "supple/core/interactions.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -101,7 +101,7 @@ TEST(Model, GivesParticlesTheInertiaOfABall) {
 
 TEST(Model, FindsNearestNeighboursOfUnevenPoints) {
   // A pair close together and one far away: each has its own nearest distance.
-  const fs::path folder = fs::path(testing::TempDir()) / "supple_model_points";
+  const fs::path folder = temp_folder() / "model_points";
   fs::create_directories(folder);
   std::ofstream(folder / "points.csv") << "x,y,z\n0,0,0\n0.1,0,0\n5,0,0\n5,3,0\n";
   const std::string text = std::string(kHead) + "  - {name: a, particles: {arrange: file, file: points.csv}}\n";
@@ -144,7 +144,7 @@ TEST(Model, RefusesScenesMadeByHandThatNoFileCouldAskFor) {
 }
 
 TEST(Model, HasALengthWhereParticlesLieAtOnePlace) {
-  const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("supple_model_" + std::to_string(::getpid()));
+  const std::filesystem::path folder = temp_folder() / "model";
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "twice.csv") << "0, 0, 0\n0, 0, 0\n";
   const auto length = [&](const std::string& rest) {

@@ -11,6 +11,7 @@
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -50,7 +51,7 @@ double rest_height(Simulation simulation) {
 }
 
 TEST(Obstacles, CarryABallAsTheGroundDoes) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   {
     std::ofstream file(folder / "flat.csv");
@@ -130,7 +131,7 @@ void write_slab(const fs::path& file, bool open, double thickness = 1.0, double 
 }
 
 TEST(Obstacles, OfMeshesCarryABallAsTheGroundDoes) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   write_slab(folder / "slab.obj", false);
   const double on_ground = rest_height(make(ball_over("ground: {height: 0, modulus: 1e6}")));
@@ -171,7 +172,7 @@ void write_ball(const fs::path& file, double radius, int cuts) {
 
 TEST(Obstacles, OfMeshesPressAsTheBallTheyShowWithFinerFaces) {
   // An octahedron with faces cut finely, on a sphere of 0.3 m; pressures rise by the same 1e5 Pa/m in both balls.
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   // Closed form: the circle where both are at pressure p, summed over p by Simpson's rule.
   const double rise = 1e5, radius = 0.1, other = 0.3, distance = 0.37;
@@ -210,7 +211,7 @@ objects:
 }
 
 TEST(Obstacles, RefuseMeshesThatAreOpenAndNameAnEdge) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   write_slab(folder / "open.obj", true);
   const auto message = [&](const std::string& keys) -> std::string {
@@ -229,7 +230,7 @@ TEST(Obstacles, RefuseMeshesThatAreOpenAndNameAnEdge) {
 }
 
 TEST(Obstacles, OfThinMeshesCarryABallAsTheGroundDoes) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   write_slab(folder / "sheet.obj", false, 0.04);
   // Below the ball the sheet is as stiff as the ground down to its middle, far deeper than the ball sinks in.
@@ -239,7 +240,7 @@ TEST(Obstacles, OfThinMeshesCarryABallAsTheGroundDoes) {
 
 // A block of 1 m with a shelf 10 mm thick that stands out by 0.3 m.
 TEST(Obstacles, OfABlockWithAThinShelfCarryABallOnIt) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   {
     std::ofstream out(folder / "shelf.obj");
@@ -276,7 +277,7 @@ objects:
 }
 
 TEST(Obstacles, OfMeshesWithACavityHoldABallInIt) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   {
     std::ofstream out(folder / "container.obj");
@@ -297,7 +298,7 @@ TEST(Obstacles, OfMeshesWithACavityHoldABallInIt) {
 }
 
 TEST(Obstacles, OfMeshesAreToldWhereTheyAreMended) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   write_slab(folder / "slab.obj", false);
   std::string text;
@@ -315,7 +316,7 @@ TEST(Obstacles, OfMeshesAreToldWhereTheyAreMended) {
 
 // A ball whose tip is on the far side of a thin sheet, or beyond it, of which few of its samples or none lie in the sheet.
 TEST(Obstacles, OfThinMeshesAreMetHoweverDeep) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   constexpr double kRadius = 0.1, kStiffness = 1e5;
   // As of a plane under each face: pi k d^2 (3 R - 2 d) / 3 at the depth d.
@@ -358,7 +359,7 @@ void write_heights(const fs::path& file, const Height& height) {
 }
 
 TEST(Obstacles, OfHeightsThatRiseEvenlyAreThePlane) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   write_heights(folder / "slope.csv", [](double x, double y) { return 0.24 * x - 0.32 * y; });
   const std::string exact = "contact: {error: 1e-8}\n";
   Simulation heights = make(ball_over(exact + "obstacles: [{name: slope, shape: heights, file: slope.csv, modulus: 1e4}]"), folder);
@@ -387,7 +388,7 @@ obstacles: [)" + obstacle + "]\n";
 }
 
 TEST(Obstacles, OfHeightsArePlanesUpToTheirBorders) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   write_heights(folder / "ramp.csv", [](double x, double) { return 0.2 * x; });
   for (const double x : {-1.55, -1.0, 0.0, 0.333, 1.2, 1.5, 1.53}) {
     Simulation plane = make(ball_on_ramp(x, "{name: ramp, shape: plane, normal: [-0.2, 0, 1]}"));
@@ -433,7 +434,7 @@ objects:
 }
 
 TEST(Obstacles, OfHeightsHoldABallInTheirHollow) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   write_heights(folder / "hollow.csv", [](double x, double y) { return 0.4 * ((x - 0.1) * (x - 0.1) + (y + 0.2) * (y + 0.2)) - 0.1; });
   Simulation simulation = make(ball_over("obstacles: [{name: hollow, shape: heights, file: hollow.csv, modulus: 1e6}]"), folder);
   run(simulation, 61);
@@ -443,7 +444,7 @@ TEST(Obstacles, OfHeightsHoldABallInTheirHollow) {
 }
 
 TEST(Obstacles, RefuseHeightsThatAreNoGrid) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   std::ofstream(folder / "holes.csv") << "0,0,0\n1,0,0\n0,1,0\n";
   try {
@@ -568,7 +569,7 @@ objects:
 
 // Six that move make 15 pairs, and each of them two with what stands still.
 TEST(SeparateBodies, MayBeginInOnePlace) {
-  const fs::path folder = fs::temp_directory_path() / "supple_obstacles";
+  const fs::path folder = temp_folder() / "obstacles";
   fs::create_directories(folder);
   std::ofstream(folder / "twice.csv") << "0,0,0\n0,0,0\n";
   const std::string head = "schema: 1\nduration: 1\nframe_rate: 10\nobjects:\n  - name: twins\n    skeleton: [{shape: point, kernel: {radius: 0.1}}]\n";

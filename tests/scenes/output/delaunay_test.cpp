@@ -17,6 +17,7 @@
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
 #include "supple/scenes/simulation.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -142,7 +143,7 @@ TEST(DelaunayScene, RefusesATinyDistanceAloneAndInContact) {
 // A signal does not wait for a mesh; what was saved is continued to the same files.
 TEST(DelaunayScene, ASignalEndsAMesh) {
   namespace fs = std::filesystem;
-  const fs::path folder = fs::path(testing::TempDir()) / "delaunay_signal";
+  const fs::path folder = temp_folder() / "delaunay_signal";
   fs::remove_all(folder);
   const Scene scene = parse_scene(std::string(kTwoBalls) + "output: {mesh: ply, cell: 0.1, meshing: {method: delaunay}}\n", "balls.yaml", ".");
   RunOptions options{.folder = folder / "whole", .threads = 1, .delaunay = cgal::delaunay_mesh};
@@ -176,7 +177,7 @@ TEST(DelaunayScene, ASignalEndsAMesh) {
 }
 
 TEST(DelaunayScene, TellsOfTrianglesThatCrossInAllFrames) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "delaunay_crossings";
+  const std::filesystem::path folder = temp_folder() / "delaunay_crossings";
   for (const int frame : {1, 2}) {
     SearchCounts counts;
     counts.crossings = static_cast<std::uint64_t>(frame);

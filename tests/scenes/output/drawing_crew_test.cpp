@@ -9,6 +9,7 @@
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -29,7 +30,7 @@ output: {images: {size: [96, 64], samples: 1}}
 
 class DrawingCrew : public testing::Test {
  protected:
-  DrawingCrew() : folder_(fs::path(testing::TempDir()) / (std::string("crew_") + testing::UnitTest::GetInstance()->current_test_info()->name())) {
+  DrawingCrew() : folder_(temp_folder() / (std::string("crew_") + testing::UnitTest::GetInstance()->current_test_info()->name())) {
     fs::remove_all(folder_);
   }
   ~DrawingCrew() override { fs::remove_all(folder_); }

@@ -16,6 +16,7 @@
 #include "supple/scenes/inspect.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -35,7 +36,7 @@ std::vector<std::byte> bytes_of(const fs::path& path) { return io::read_file(pat
 class LooksOfFrames : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ = temp_folder() / testing::UnitTest::GetInstance()->current_test_info()->name();
     fs::remove_all(folder_);
     const RunResult whole = run_scene(scene(), options());
     ASSERT_EQ(whole.outcome, "done") << whole.reason;

@@ -11,6 +11,7 @@
 #include "supple/implicit/surface_grid.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -25,7 +26,7 @@ output: {grid: vdb}
 class GridFiles : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / "grid_files" / testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ = temp_folder() / "grid_files" / testing::UnitTest::GetInstance()->current_test_info()->name();
     fs::remove_all(folder_);
     scene_ = parse_scene(kTwo, "drops.yaml", ".");
     scene_.source = "drops.yaml";

@@ -14,6 +14,7 @@
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
 #include "supple/scenes/simulation.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -39,7 +40,7 @@ constexpr const char* kOneCamera = "camera: {from: [0, -3, 1], look_at: [0, 0, 0
 
 class Looks : public testing::Test {
  protected:
-  Looks() : folder_(fs::path(testing::TempDir()) / ("looks_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
+  Looks() : folder_(temp_folder() / ("looks_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
     fs::remove_all(folder_);
   }
   ~Looks() override { fs::remove_all(folder_); }

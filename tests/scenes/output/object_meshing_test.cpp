@@ -17,6 +17,7 @@
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -236,7 +237,7 @@ TEST(ObjectMeshing, CellsThatKeepACreaseCutOffAreReported) {
 }
 
 TEST(ObjectMeshing, CellsThatKeepACreaseCutOffAreCounted) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "blunt_cells";
+  const std::filesystem::path folder = temp_folder() / "blunt_cells";
   for (const int frame : {1, 2}) {
     SearchCounts counts;
     counts.blunt["pair"] = static_cast<std::uint64_t>(2 + frame);
@@ -288,7 +289,7 @@ TEST(ObjectMeshing, BulgesHoldTheVolumeOfEachBodyOrAWarningTells) {
 }
 
 TEST(ObjectMeshing, BulgesThatHoldTooLittleAreToldOnceForAllFrames) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "short_bulges";
+  const std::filesystem::path folder = temp_folder() / "short_bulges";
   for (const int frame : {1, 2, 3}) {
     SearchCounts counts;
     counts.short_bulges["ball"]["ground"] = {.count = 2, .held = frame == 2 ? 0.5 : 0.75, .time = 0.1 * frame};

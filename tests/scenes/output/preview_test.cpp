@@ -2,7 +2,6 @@
 #include "supple/scenes/preview.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -12,6 +11,7 @@
 #include "supple/scenes/estimate.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/read_scene.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -40,7 +40,7 @@ TEST(Preview, KeepsStepsThatTheSceneFixes) {
 }
 
 TEST(DryRun, CountsWhatTheRunMakes) {
-  const fs::path folder = fs::temp_directory_path() / ("dry_run_" + std::to_string(getpid()));
+  const fs::path folder = temp_folder() / "dry_run";
   const std::string text = std::string(small::kTwoDrops) + "duration: 1 s\noutput: {mesh: ply, particles: csv}\n";
   const Scene scene = parse_scene(text, "drops.yaml", folder);
   RunOptions options{.folder = folder};

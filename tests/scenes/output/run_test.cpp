@@ -25,6 +25,7 @@
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -41,7 +42,7 @@ output: {images: {size: [96, 64], samples: 1}, film: true, contacts: csv, partic
 class Run : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ = temp_folder() / testing::UnitTest::GetInstance()->current_test_info()->name();
     fs::remove_all(folder_);
     scene_ = parse_scene(kTiny, "drops.yaml", ".");
     scene_.source = "drops.yaml";
@@ -741,9 +742,9 @@ TEST_F(Run, TellsTooFineCellsBeforeAStepAsItRefusesThem) {
 }
 
 TEST_F(Run, SaysWhenAFolderCannotBeMade) {
-  std::ofstream(fs::path(testing::TempDir()) / "plain_file") << "x";
+  std::ofstream(temp_folder() / "plain_file") << "x";
   RunOptions o = options();
-  o.folder = fs::path(testing::TempDir()) / "plain_file" / "out";
+  o.folder = temp_folder() / "plain_file" / "out";
   try {
     (void)run_scene(scene_, o);
     FAIL();
@@ -817,7 +818,7 @@ TEST(Query, AnswersForcesContactFieldAndMeshAsJson) {
   EXPECT_DOUBLE_EQ(forces.at("laws").back().at("particles")[0].at("force")[0].get<double>(),
                    pair.at("force_n")[0].get<double>());
 
-  const fs::path points = fs::path(testing::TempDir()) / "points.csv";
+  const fs::path points = temp_folder() / "points.csv";
   std::ofstream(points) << "x,y,z\n-0.2,0,0\n5,5,5\n";
   const json field = json::parse(query_field(simulation, points));
   EXPECT_DOUBLE_EQ(field.at("objects")[0].at("points")[0].at("value").get<double>(), 0.5);
@@ -826,7 +827,7 @@ TEST(Query, AnswersForcesContactFieldAndMeshAsJson) {
   const json mesh = json::parse(query_mesh(simulation, {.cells = 24, .out = {}}));
   EXPECT_TRUE(mesh.at("objects")[0].at("closed").get<bool>());
   EXPECT_EQ(mesh.at("objects")[0].at("euler_characteristic"), 2);
-  const fs::path file = fs::path(testing::TempDir()) / "queried.obj";
+  const fs::path file = temp_folder() / "queried.obj";
   (void)query_mesh(simulation, {.cells = 24, .out = file});
   std::size_t vertices = 0;
   for (const auto& object : mesh.at("objects")) {

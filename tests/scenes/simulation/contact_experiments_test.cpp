@@ -15,6 +15,7 @@
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -166,7 +167,7 @@ pairs: [{objects: [ball, floor], dissipation: 0.5}]
   double work = 0.0;
   while (simulation.state().particles.velocity[0].z() < 0.0 || simulation.state().particles.position[0].z() < 0.101) {
     if (restart && simulation.state().particles.position[0].z() < 0.09) {
-      const fs::path file = fs::path(::testing::TempDir()) / "pair_work.state";
+      const fs::path file = temp_folder() / "pair_work.state";
       save_state(file, simulation.state(), {.scene = 1});
       simulation.restore(load_state(file, {.scene = 1}));
       restart = false;

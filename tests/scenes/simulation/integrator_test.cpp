@@ -10,6 +10,7 @@
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -101,7 +102,7 @@ TEST(IntegratorKey, KeepsTheBitsOfARestartAndOfEveryNumberOfThreads) {
     const std::string text = chain(method(name));
     Simulation whole = make(text);
     run(whole, 4);
-    const fs::path path = fs::path(testing::TempDir()) / ("integrator_" + name + ".state");
+    const fs::path path = temp_folder() / ("integrator_" + name + ".state");
     save_state(path, whole.state(), {.scene = 7});
     run(whole, 8);
     Simulation resumed = make(text, 3);

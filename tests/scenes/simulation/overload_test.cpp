@@ -10,6 +10,7 @@
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -131,7 +132,7 @@ TEST(Overload, OfConcentricBallsHoldsTheEnergyOfTheSofter) {
 
 // A shelf of 10 mm that is part of a block of 1 m.
 TEST(Overload, IsNotReportedOfAThinPartOfAMesh) {
-  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "overload_shelf";
+  const std::filesystem::path folder = temp_folder() / "overload_shelf";
   std::filesystem::create_directories(folder);
   std::ofstream file(folder / "shelf.obj");
   // A profile in x and z, between two planes of y.
@@ -166,7 +167,7 @@ objects:
 
 TEST(Overload, IsKeptWithTheState) {
   const Simulation simulation = run(balls(15.0), 8);
-  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "overload.state";
+  const std::filesystem::path file = temp_folder() / "overload.state";
   save_state(file, simulation.state(), {.scene = 1});
   const State loaded = load_state(file, {.scene = 1});
   ASSERT_EQ(loaded.record.overloads.size(), 1u);

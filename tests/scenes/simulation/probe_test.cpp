@@ -12,6 +12,7 @@
 #include "supple/scenes/pictures.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -148,7 +149,7 @@ TEST(DrawPicture, IsTheFrameOfARun) {
                            "cameras:\n  - {name: front, from: [0, -4, 1], look_at: [0, 0, 0]}\n  - {name: side, from: [4, 0, 1], look_at: [0, 0, 0]}\n" +
                            "render: {pixel_error: 0.5}\noutput: {images: {size: [64, 48]}}\n";
   const Scene scene = parse_scene(text, "test.yaml", ".");
-  const fs::path folder = fs::path(::testing::TempDir()) / "draw_picture";
+  const fs::path folder = temp_folder() / "draw_picture";
   fs::remove_all(folder);
   ASSERT_EQ(run_scene(scene, {.folder = folder, .frames = {2}, .threads = 1}).outcome, "done");
   Simulation simulation(scene), plain(scene);

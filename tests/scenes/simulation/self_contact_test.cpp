@@ -9,6 +9,7 @@
 #include "supple/core/mesh.h"
 #include "supple/scenes/contact_report.h"
 #include "supple/scenes/query.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -381,7 +382,7 @@ TEST(GroupContact, IsNotLookedForWhereBondsTieAllGroups) {
 
 // Two rows of three, each a component with two groups.
 TEST(GroupContact, IsWithinComponents) {
-  const std::filesystem::path folder = ::testing::TempDir();
+  const std::filesystem::path folder = temp_folder();
   std::ofstream(folder / "two_rows.csv") << "-0.25, 0, 0\n0, 0, 0\n0.25, 0, 0\n-0.25, 1, 0\n0, 1, 0\n0.25, 1, 0\n";
   Simulation rows(parse_scene("schema: 1\nduration: 1\nframe_rate: 20\nobjects:\n  - name: rows\n    particles: {arrange: file, file: two_rows.csv, mass: 0.1, inertia_radius: 0.1}\n"
                               "    skeleton: [" + std::string(kBall) + "]\n    blend: {rule: graph, within: 0.3}\n    contact: {modulus: 2e4}\n"
@@ -401,7 +402,7 @@ TEST(GroupContact, IsWithinComponents) {
 
 // One group presses on two that blend with each other, where all three overlap: the energy is that of the pair that presses harder.
 TEST(GroupContact, KeepsItsEnergyWhereThreeOverlap) {
-  const std::filesystem::path folder = ::testing::TempDir();
+  const std::filesystem::path folder = temp_folder();
   std::ofstream(folder / "hook.csv") << "0.375, 0.4, 0\n-0.6, 0.4, 0\n-0.6, 0, 0\n0.25, 0, 0\n0.5, 0, 0\n";
   Simulation hook(parse_scene("schema: 1\nduration: 2\nframe_rate: 50\ntime_step: {substeps: 64}\nobjects:\n  - name: hook\n"
                               "    particles: {arrange: file, file: hook.csv, mass: 0.1, inertia_radius: 0.1}\n    skeleton: [" + std::string(kBall) +
@@ -430,7 +431,7 @@ TEST(GroupContact, KeepsItsEnergyWhereThreeOverlap) {
 
 /// One group presses on two that blend with each other; all are bonded in their order.
 Simulation bonded_hook(const std::string& keys, SimulationOptions options = {}) {
-  const std::filesystem::path folder = ::testing::TempDir();
+  const std::filesystem::path folder = temp_folder();
   std::ofstream(folder / "bonded_hook.csv") << "0.375, 0.4, 0\n-0.6, 0.4, 0\n-0.6, 0, 0\n0.25, 0, 0\n0.5, 0, 0\n";
   return Simulation(parse_scene("schema: 1\nduration: 2\nframe_rate: 50\ntime_step: {substeps: 64}\nobjects:\n  - name: hook\n"
                                 "    particles: {arrange: file, file: bonded_hook.csv, mass: 0.1, inertia_radius: 0.1}\n    skeleton: [" + std::string(kBall) +
@@ -498,7 +499,7 @@ TEST(GroupContact, RestsWithItsPiece) {
 
 /// Two pinned parts and one between them, which loads pull off the first until that bond breaks and then press on it; the other bond holds.
 Simulation swing(const std::string& fade, const std::string& contact = "{modulus: 2e4}", SimulationOptions options = {}) {
-  const std::filesystem::path folder = ::testing::TempDir();
+  const std::filesystem::path folder = temp_folder();
   std::ofstream(folder / "swing.csv") << "0, 0, 0\n0.25, 0, 0\n0.25, 0.6, 0\n";
   return Simulation(parse_scene("schema: 1\nduration: 2\nframe_rate: 50\nobjects:\n  - name: swing\n"
                                 "    particles: {arrange: file, file: swing.csv, mass: 0.1, inertia_radius: 0.1}\n    skeleton: [" + std::string(kBall) +

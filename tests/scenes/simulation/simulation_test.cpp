@@ -16,6 +16,7 @@
 #include "supple/core/interrupt.h"
 #include "supple/core/mesh.h"
 #include "supple/scenes/read_scene.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -409,7 +410,7 @@ TEST(SceneDeterminism, RestartFromASavedStateGivesTheSameBits) {
   Simulation whole(scene);
   run(whole, 10);
   for (int k = 0; k < 5; ++k) whole.step();  // in the middle of a frame too
-  const fs::path path = fs::path(testing::TempDir()) / "restart.state";
+  const fs::path path = temp_folder() / "restart.state";
   save_state(path, whole.state(), {.scene = 42});
   run(whole, 16);
 

@@ -12,6 +12,7 @@
 #include "simulation/rest.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -139,7 +140,7 @@ TEST(Sleep, HasTheSameBitsForAnyThreadsAndWhenContinued) {
   EXPECT_TRUE(std::any_of(saved.begin(), saved.end(), [](const State& s) {
     return s.sleep.any_asleep() && std::count(s.sleep.island.begin(), s.sleep.island.end(), collision::SleepState::kAwake) > 0;
   }));
-  const fs::path file = fs::temp_directory_path() / "supple_sleep.state";
+  const fs::path file = temp_folder() / "sleep.state";
   for (const State& state : saved) {
     save_state(file, state, {.scene = 7});
     Simulation continued = make(scene, {.threads = 2});

@@ -9,6 +9,7 @@
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 
 namespace supple::scenes {
 namespace {
@@ -131,7 +132,7 @@ TEST(Stick, GoesOnFromASavedStateWithTheSameBits) {
   Simulation whole = make(table(0.5, kStick)), first = make(table(0.5, kStick)), second = make(table(0.5, kStick), 2);
   run(whole, 12);
   run(first, 6);
-  const std::filesystem::path file = std::filesystem::temp_directory_path() / "supple_stick.state";
+  const std::filesystem::path file = temp_folder() / "stick.state";
   save_state(file, first.state(), {.scene = 7});
   second.restore(load_state(file, {.scene = 7}));
   std::filesystem::remove(file);

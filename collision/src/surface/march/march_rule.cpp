@@ -466,9 +466,11 @@ bool MarchRuleSolver::may_meet(const PairPressure& pressure, const Box& overlap)
   return true;
 }
 
-bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
-                            const Limits& limits, const Regions& regions, const std::optional<CommonAxis>& axis, const Vec3& reference,
-                            PatchPoints& points) {
+bool MarchRuleSolver::solve(const Job& job, PatchPoints& points) {
+  PairPressure& pressure = job.pressure;
+  const std::span<const ContactBody* const> third = job.third;
+  const Box& overlap = job.overlap;
+  const Limits& limits = job.limits;
   estimate_ = 1.0;
   thickness_ = 0.0;
   points.clear();
@@ -479,9 +481,9 @@ bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody*
   bool fine = false;
   const auto solve_on = [&](const std::optional<FlatCells>& cells) {
     on_sigma_ = kOnSigma;
-    fine = lay_mesh(pressure, third, overlap, axis, cells);
+    fine = lay_mesh(pressure, third, overlap, job.axis, cells);
     on_sigma_ = std::max(std::clamp(1e-2 * limits.error, kOnSigmaAtBest, kOnSigma), 64.0 * kEpsilon * coordinates / cell_);
-    return refine(pressure, third, limits, reference);
+    return refine(pressure, third, limits, job.reference);
   };
   bool met = solve_on({});
   if (!met || (!fine && estimate_ > limits.error)) {
@@ -509,7 +511,7 @@ bool MarchRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody*
   }
   for (const int side : {0, 1}) {
     const Node& top = nodes_[peak];
-    if (regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, third, limits.error, top, points);
+    if (job.regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, third, limits.error, top, points);
     thickness_ += pressure.overlap_out_of(side, top.point, (side == 0 ? 1.0 : -1.0) * top.normal, cell_);
   }
   if (thickness_ > 0.0) estimate_ = std::min(1.0, estimate_ + 2.0 * rounding_error(coordinates, thickness_));

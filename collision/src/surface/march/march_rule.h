@@ -23,13 +23,17 @@ class MarchRuleSolver {
     double error;     ///< relative, asked for
     int refinements;  ///< times that pieces of images are split, at most
   };
-  /// @param third  bodies whose larger pressure takes space away from the pair
-  /// @param regions  what is wanted of the squeezed regions
-  /// @param axis  all around which both bodies, and no third, are the same: what is sideways to it cancels but for round-off
-  /// @param reference  origin of the moments in `sums`
+  struct Job {
+    PairPressure& pressure;
+    std::span<const ContactBody* const> third;  ///< bodies whose larger pressure takes space away from the pair
+    Box overlap;
+    Regions regions;  ///< what is wanted of the squeezed regions
+    Vec3 reference;   ///< origin of the moments in `sums`
+    std::optional<CommonAxis> axis;  ///< all around which both bodies, and no third, are the same: what is sideways to it cancels but for round-off
+    Limits limits;
+  };
   /// @return whether Sigma was met
-  bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const Limits& limits,
-             const Regions& regions, const std::optional<CommonAxis>& axis, const Vec3& reference, PatchPoints& points);
+  bool solve(const Job& job, PatchPoints& points);
 
   /// False: bounds of the fields leave no room for Sigma, but for what presses less than a tenth of what the softer body may there: surfaces in one place
   /// have no other one.

@@ -403,8 +403,10 @@ void SampleRuleSolver::add_columns_across(PairPressure& pressure, int side, Patc
   add_to_region(pressure, side, begin, value_, points);
 }
 
-bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, double spacing,
-                             const Limits& limits, const Regions& regions, const Vec3& reference, PatchPoints& points) {
+bool SampleRuleSolver::solve(const Job& job, PatchPoints& points) {
+  PairPressure& pressure = job.pressure;
+  const Box& overlap = job.overlap;
+  const Limits& limits = job.limits;
   body_ = {&pressure.body(0), &pressure.body(1)};
   estimate_ = 1.0;
   thickness_ = 0.0;
@@ -418,13 +420,13 @@ bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody
   int refined = -1;
   Box patch = shrink(overlap);
   if (patch.empty()) return false;
-  spacing_ = spacing;
+  spacing_ = job.spacing;
   for (int level = 0; level < kMostLevels; ++level, spacing_ *= 0.5) {
     const Box box = patch.inflated(spacing_);
     std::size_t seen = 0;
     for (const int side : {0, 1}) seen += send(pressure, side, box, spacing_);
     find_crossings(pressure, scale);
-    place_points(pressure, third, reference, points);
+    place_points(pressure, job.third, job.reference, points);
     const bool last = 4 * seen > limits.rays || level + 1 == kMostLevels;
     const std::size_t before = std::exchange(evaluated, pressure.evaluations() - evaluated_before);
     // What the error falls to, and evaluations grow to, when the spacing is halved.
@@ -453,9 +455,9 @@ bool SampleRuleSolver::solve(PairPressure& pressure, std::span<const ContactBody
   }
   if (!(sums_.load > 0.0)) return false;
   for (const int side : {0, 1}) {
-    if (regions[static_cast<std::size_t>(side)] == Region::None) continue;
+    if (job.regions[static_cast<std::size_t>(side)] == Region::None) continue;
     if (body_[static_cast<std::size_t>(side)]->skeleton != nullptr) {
-      add_columns(pressure, side, third, points);
+      add_columns(pressure, side, job.third, points);
     } else {
       add_columns_across(pressure, side, points);
     }

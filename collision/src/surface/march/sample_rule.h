@@ -23,14 +23,18 @@ class SampleRuleSolver {
     std::size_t rays;         ///< of both bodies, looked at in one layout
     std::size_t evaluations;  ///< of pressures, in all layouts, about: with more of them there is nothing, unless the error is met
   };
-  /// Halves the spacing of the seeds until two consecutive layouts agree to the error asked for, within these limits.
-  /// @param third  bodies whose larger pressure takes space away from the pair
-  /// @param spacing  of the seeds to begin with [m], > 0
-  /// @param regions  what is wanted of the squeezed regions
-  /// @param reference  origin of the moments in `sums`
+  struct Job {
+    PairPressure& pressure;
+    std::span<const ContactBody* const> third;  ///< bodies whose larger pressure takes space away from the pair
+    Box overlap;
+    Regions regions;  ///< what is wanted of the squeezed regions
+    Vec3 reference;   ///< origin of the moments in `sums`
+    double spacing;   ///< of the seeds to begin with [m], > 0
+    Limits limits;
+  };
+  /// Halves the spacing of the seeds until two consecutive layouts agree to the error asked for, within the job's limits.
   /// @return whether Sigma was met, within the limits; false too where neither body has a skeleton
-  bool solve(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, double spacing,
-             const Limits& limits, const Regions& regions, const Vec3& reference, PatchPoints& points);
+  bool solve(const Job& job, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }
   [[nodiscard]] double estimate() const noexcept { return estimate_; }

@@ -234,8 +234,8 @@ bool ImprintFinder::follow_border(PairPressure& pressure, const PeakFrame& frame
 }
 
 /// Where the border leaves the patch: p = 0 = excess, begun between two of its points. @return false where that is not between them
-bool ImprintFinder::leave_between(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Spot& centre, const Node& a,
-                                  const Node& b, Node& out) {
+bool ImprintFinder::leave_between(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Piece& piece, Node& out) {
+  const auto& [centre, a, b] = piece;
   Spot spot = a.spot;
   spot.at = 0.5 * (a.spot.at + b.spot.at);
   Vec2 move = Vec2::Zero();
@@ -257,8 +257,8 @@ bool ImprintFinder::leave_between(PairPressure& pressure, const PeakFrame& frame
 }
 
 /// Where a ray from the frame's origin touches the border between two of its points; nothing where none does.
-std::optional<Vec2> ImprintFinder::touch_between(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Spot& centre,
-                                                 const Node& a, const Node& b) {
+std::optional<Vec2> ImprintFinder::touch_between(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Piece& piece) {
+  const auto& [centre, a, b] = piece;
   const auto along = [](const Spot& spot) { return spot.rise.dot(spot.at); };
   double low = 0.0, high = 1.0, at_low = along(a.spot), at_high = along(b.spot);
   if ((at_low > 0.0) == (at_high > 0.0)) return std::nullopt;
@@ -329,13 +329,13 @@ bool ImprintFinder::trace(PairPressure& pressure, const PolarCover& cover, const
     around = around && cross(here.spot.at, end.spot.at) > 0.0;
     out.border.push_back(here.spot.at);
     Node corner;
-    const bool leaves = here.spot.on_rim() != end.spot.on_rim(), found = leaves && leave_between(pressure, frame, body, centre, here, end, corner);
+    const bool leaves = here.spot.on_rim() != end.spot.on_rim(), found = leaves && leave_between(pressure, frame, body, {centre, here, end}, corner);
     if (leaves) {
       const Vec2 middle = 0.5 * (here.spot.at + end.spot.at);
       out.leaves.push_back(found ? place_of(frame, corner.spot.at, corner.spot.height) : place_of(frame, middle, here.spot.height));
     }
     const auto add_touch = [&](const Node& a, const Node& b) {
-      const std::optional<Vec2> touch = touch_between(pressure, frame, body, centre, a, b);
+      const std::optional<Vec2> touch = touch_between(pressure, frame, body, {centre, a, b});
       if (!touch) return;
       out.border.push_back(*touch);
       out.touches.push_back(*touch);

@@ -56,8 +56,13 @@ class ImprintFinder {
   void begin_on_grid(PairPressure& pressure, const PolarCover& cover, const ContactBody& body);
   bool begin_at_core(PairPressure& pressure, const PolarCover& cover, const ContactBody& body);
   bool follow_border(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Spot& centre, double enough, double farthest);
-  bool leave_between(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Spot& centre, const Node& a, const Node& b, Node& out);
-  std::optional<Vec2> touch_between(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Spot& centre, const Node& a, const Node& b);
+  /// A piece of the border, between two of its points, as seen from the centre.
+  struct Piece {
+    Spot centre;
+    Node a, b;
+  };
+  bool leave_between(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Piece& piece, Node& out);
+  std::optional<Vec2> touch_between(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Piece& piece);
 
   PressureBatch batch_;
   std::vector<Spot> spots_;

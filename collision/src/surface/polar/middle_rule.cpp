@@ -407,11 +407,10 @@ void PolarRuleSolver::place_rays(const KronrodRule& rule, std::size_t first) {
 }
 
 /// @param frame  of any place of the patch   @return false where no kink crosses, or this does not fit
-bool PolarRuleSolver::solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                         const Regions& regions, PatchPoints& points) {
-  if (!part_about_middle(pressure, frame, settings)) return false;
+bool PolarRuleSolver::solve_about_middle(const PolarJob& job, const PeakFrame& frame, PatchPoints& points) {
+  if (!part_about_middle(job.pressure, frame, job.settings)) return false;
   parted_ = static_cast<std::uint32_t>(crossing_.size());
-  return finish(pressure, column_of(settings.error), regions, settings.error, nullptr, points);
+  return finish(job.pressure, column_of(job.settings.error), job.regions, job.settings.error, nullptr, points);
 }
 
 bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings) {

@@ -87,7 +87,7 @@ PolarPatches::Patch PolarPatches::add_patch(const PolarJob& job, const StartPoin
   if (!on_axis) frame = finder_.climb(job.pressure, hill.at, job.extent, job.faces, job.faces);
   if (!frame || covered({frame->origin, frame->axis}, 0.0)) return Patch::Known;
   const auto fits = [&] {
-    return polar_.solve(job.pressure, *frame, job.settings, job.regions, 2.0 * job.extent, job.third, on_axis, follow, job.faces, out.points);
+    return polar_.solve(job, *frame, {.round = on_axis, .follow = follow}, out.points);
   };
   if (!fits()) {
     if (polar_.rounding() > kLostInRounding) return Patch::Lost;

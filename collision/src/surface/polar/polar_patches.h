@@ -10,21 +10,10 @@
 #include "surface/find_peak.h"
 #include "surface/pair_pressure.h"
 #include "surface/pair_result.h"
+#include "surface/polar/polar_job.h"
 #include "surface/polar/polar_rule.h"
 
 namespace supple::collision {
-
-/// A pair as its patches need it.
-struct PolarJob {
-  PairPressure& pressure;
-  ContactSettings settings;
-  Regions regions;
-  double extent = 0.0;     ///< longest half axis of a patch that is believed [m]
-  double spacing = 0.0;    ///< of the seeds [m]; 0 where there are none
-  std::optional<CommonAxis> axis;
-  bool faces = false;      ///< the bodies are convex: they may touch with faces
-  std::span<const ContactBody* const> third;  ///< that patches are cut at
-};
 
 class PolarPatches {
  public:

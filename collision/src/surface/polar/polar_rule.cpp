@@ -319,12 +319,12 @@ double PolarRuleSolver::placing_error() const { return lift_ / std::sqrt(fine_.a
 /// The same, and what the rim is off by.
 double PolarRuleSolver::algebraic_error() const { return 2.0 * rim_error_ + placing_error(); }
 
-bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                            const Regions& regions, double extent,
-                            std::span<const ContactBody* const> third, bool round, bool follow, bool faces, PatchPoints& points) {
+bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const Known& known, PatchPoints& points) {
+  PairPressure& pressure = job.pressure;
+  const std::span<const ContactBody* const> third = job.third;
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
-  extent_ = extent;
-  error_ = settings.error;
+  extent_ = 2.0 * job.extent;
+  error_ = job.settings.error;
   third_ = third;
   imprints_.clear();
   uneven_ = false;
@@ -335,7 +335,7 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
     may_go_through_ = may_go_through_ || ((!core || !core->round) && third.empty());
   }
   for (const int side : {0, 1}) {
-    const bool wanted = !third.empty() && regions[static_cast<std::size_t>(side)] != Region::None;
+    const bool wanted = !third.empty() && job.regions[static_cast<std::size_t>(side)] != Region::None;
     apex_[side] = wanted ? find_apex(pressure, side, third, frame.origin, (side == 0 ? 1.0 : -1.0) * frame.axis) : std::nullopt;
     if (apex_[side] && apex_[side]->lost) apex_[side].reset();  // ways out of it would lead against the axis
   }
@@ -345,18 +345,22 @@ bool PolarRuleSolver::solve(PairPressure& pressure, const PeakFrame& frame, cons
     return true;
   };
   const bool peaked = !frame.flat;
-  if (peaked && !follow && solve_about_peak(pressure, frame, settings, regions, round, false, true, points)) return true;
-  if (faces && anew() && solve_about_middle(pressure, frame, settings, regions, points)) return true;
-  if (peaked && anew() && solve_about_star(pressure, frame, settings, regions, follow, points)) return true;
-  if (uneven_ && anew() && solve_about_peak(pressure, frame, settings, regions, round, false, false, points)) return true;
-  if (peaked && !follow && anew() && solve_about_peak(pressure, frame, settings, regions, round, true, false, points)) return true;
+  const auto [round, follow] = known;
+  if (peaked && !follow && solve_about_peak(job, frame, {.round = round, .star = true}, points)) return true;
+  if (job.faces && anew() && solve_about_middle(job, frame, points)) return true;
+  if (peaked && anew() && solve_about_star(job, frame, follow, points)) return true;
+  if (uneven_ && anew() && solve_about_peak(job, frame, {.round = round}, points)) return true;
+  if (peaked && !follow && anew() && solve_about_peak(job, frame, {.round = round, .any = true}, points)) return true;
   points.back_to(before);
   return false;
 }
 
-/// @param any  whatever the error, and without regard to kinks of the fields   @param star  whether a rule about a star is tried after this one
-bool PolarRuleSolver::solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                       const Regions& regions, bool round, bool any, bool star, PatchPoints& points) {
+bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& frame, const AboutPeak& how, PatchPoints& points) {
+  PairPressure& pressure = job.pressure;
+  const ContactSettings& settings = job.settings;
+  const Regions& regions = job.regions;
+  const bool any = how.any, star = how.star;
+  bool round = how.round;
   const double error = settings.error;
   cut_ = false;
   about_middle_ = by_sectors_ = mild_ = false;

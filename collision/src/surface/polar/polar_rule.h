@@ -19,6 +19,7 @@
 #include "surface/polar/apex.h"
 #include "surface/polar/imprint.h"
 #include "surface/polar/polar_cover.h"
+#include "surface/polar/polar_job.h"
 #include "surface/quadrature.h"
 
 namespace supple::collision {
@@ -37,17 +38,14 @@ inline constexpr double kAtRim = 0.1;
 class PolarRuleSolver {
  public:
   /// Refines until two consecutive rules agree to `settings.error`, at most `settings.max_refinement` times.
-  /// @param regions  what is wanted of the squeezed regions
-  /// @param extent  rims farther away are not believed [m]
-  /// @param third  bodies that may press on the patch too: it counts where none of them presses harder, and is parted there
-  /// @param round  both pressures are the same all around the line through the frame's origin along its axis
-  /// @param follow  the rim all around, whether the peak sees it or not
-  /// @param faces  the bodies are convex: where kinks cross the patch, it is parted about its middle
+  /// What the caller knows of the patch.
+  struct Known {
+    bool round;   ///< both pressures are the same all around the line through the frame's origin along its axis
+    bool follow;  ///< follow the rim all around, whether the peak sees it or not
+  };
   /// @return false where the rule does not fit: rim not found, not a graph over the tangent plane, or the squeezed
   ///         regions reach beyond the rim. `points` is then not to be used.
-  [[nodiscard]] bool solve(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                           const Regions& regions, double extent, std::span<const ContactBody* const> third,
-                           bool round, bool follow, bool faces, PatchPoints& points);
+  [[nodiscard]] bool solve(const PolarJob& job, const PeakFrame& frame, const Known& known, PatchPoints& points);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return fine_; }  ///< about `origin()`
   [[nodiscard]] const Vec3& origin() const noexcept { return frame_.origin; }
@@ -65,8 +63,12 @@ class PolarRuleSolver {
     std::vector<Vec2> outward;                         // the pressure falls, in units of u and v
     [[nodiscard]] std::size_t size() const noexcept { return cosine.size(); }
   };
-  bool solve_about_peak(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                        const Regions& regions, bool round, bool any, bool star, PatchPoints& points);
+  struct AboutPeak {
+    bool round = false;
+    bool any = false;   ///< whatever the error, and without regard to kinks of the fields
+    bool star = false;  ///< a rule about a star is tried after this one
+  };
+  bool solve_about_peak(const PolarJob& job, const PeakFrame& frame, const AboutPeak& how, PatchPoints& points);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error, bool again);
   [[nodiscard]] bool same_side(const Vec3& from, const Vec3& to) const;
   [[nodiscard]] double rim_moved() const;
@@ -274,8 +276,7 @@ class PolarRuleSolver {
     bool fresh = true, done = false;     // without a second derivative; at the rim
     Vec2 outward = Vec2::Zero();
   };
-  bool solve_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                          const Regions& regions, PatchPoints& points);
+  bool solve_about_middle(const PolarJob& job, const PeakFrame& frame, PatchPoints& points);
   bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings);
   bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
   bool follow_rays(PairPressure& pressure);
@@ -290,8 +291,7 @@ class PolarRuleSolver {
   bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger, bool look);
 
   // About a point that sees the whole rim: star_rule.cpp.
-  bool solve_about_star(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings, const Regions& regions,
-                        bool fine, PatchPoints& points);
+  bool solve_about_star(const PolarJob& job, const PeakFrame& frame, bool fine, PatchPoints& points);
   bool move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent, double step);
   bool walk_to_rim(PairPressure& pressure, const Vec3& along, double step, Vec3& x);
   bool follow_rim_curve(PairPressure& pressure, bool fine);

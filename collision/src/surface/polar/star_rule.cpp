@@ -281,8 +281,9 @@ std::array<double, 2> PolarRuleSolver::outline_at(double cosine, double sine) co
 }
 
 /// @param frame  of the peak   @param fine  the steps along the rim   @return false where no point sees the whole rim
-bool PolarRuleSolver::solve_about_star(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings,
-                                       const Regions& regions, bool fine, PatchPoints& points) {
+bool PolarRuleSolver::solve_about_star(const PolarJob& job, const PeakFrame& frame, bool fine, PatchPoints& points) {
+  PairPressure& pressure = job.pressure;
+  const ContactSettings& settings = job.settings;
   frame_ = frame;
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   about_middle_ = false;
@@ -300,7 +301,7 @@ bool PolarRuleSolver::solve_about_star(PairPressure& pressure, const PeakFrame& 
   if (!fits) return false;
   parted_ = mild ? 0 : static_cast<std::uint32_t>(crossing_.size());
   polygon_ = outline_;
-  return finish(pressure, column_of(settings.error), regions, settings.error, nullptr, points);
+  return finish(pressure, column_of(settings.error), job.regions, settings.error, nullptr, points);
 }
 
 }  // namespace supple::collision
