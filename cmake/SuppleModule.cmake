@@ -134,6 +134,7 @@ function(supple_test module)
   set_source_files_properties(${source_dir} PROPERTIES
     COMPILE_DEFINITIONS SUPPLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SKIP_PRECOMPILE_HEADERS ON)
   add_executable(${module}_tests ${arg_SOURCES} ${source_dir} ${PROJECT_SOURCE_DIR}/tests/support/temp_folder.cpp)
+  set_target_properties(${module}_tests PROPERTIES UNITY_BUILD ${SUPPLE_UNITY_BUILD} UNITY_BUILD_MODE GROUP)
   target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${module}_tests PRIVATE supple::${module} ${arg_LIBRARIES} supple_flags GTest::gtest_main)
   # Tests take two thirds of the compiler's time with -O1, and about as long when they run: what they call is optimised.

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Groups of source files that are compiled as one translation unit (MODULE/together.cmake).
+"""Groups of source files and of test files that are compiled as one translation unit (MODULE/together.cmake).
 
 Two files may share a group when neither contains, anywhere in its text, a name that is private to the other: in an anonymous namespace, a
-static, an alias, a macro. So no name changes its meaning beside the other files of its group.
+static, an alias, a macro. So no name changes its meaning beside the other files of its group. An alias may be in both when it is the same; in tests aliases and
+directives of namespaces need only not be the names of functions and types of the other file: what is ambiguous does not compile.
 
 usage: scripts/together.py [--write] [MODULE ...]     all modules when none is named
 Lists the groups that break this rule; exit code 1 if there are any. --write makes new groups of at most 50,000 characters.
@@ -12,11 +13,11 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-MODULES = ["core", "implicit", "collision", "render", "scenes"]
+MODULES = ["core", "implicit", "collision", "render", "scenes", "tests/core", "tests/implicit", "tests/collision", "tests/render", "tests/scenes"]
 LARGEST_GROUP = 50_000  # characters
-# Files that cannot be in a group: vector code that includes itself, using-directives of namespaces, macros of a single file, OpenGL
+# Files that cannot be in a group: vector code that includes itself, macros of a single file, OpenGL
 # headers that exclude each other, and OpenVDB, which is large.
-ALONE = re.compile(r"HWY_TARGET_INCLUDE|^using namespace |SUPPLE_VERSION|<GL/osmesa.h>|<EGL/egl.h>|<openvdb/", re.MULTILINE)
+ALONE = re.compile(r"HWY_TARGET_INCLUDE|SUPPLE_VERSION|<GL/osmesa.h>|<EGL/egl.h>|<openvdb/", re.MULTILINE)
 # Fixed groups: they use the same namespaces, or have compile options of their own.
 GIVEN = {
     "implicit": [["src/grid/surface_grid.cpp", "src/grid/grid_leaves.cpp", "src/grid/grid_updater.cpp", "src/grid/union_updater.cpp"]],
@@ -30,9 +31,9 @@ def without_texts(source: str) -> str:
     return re.sub(r'"(\\.|[^"\\\n])*"', '""', source)
 
 
-def own_names(source: str) -> set:
-    """Private names of a file, from the lines that begin at the left margin."""
-    names, own = set(), False
+def own_names(source: str) -> tuple:
+    """Private names of a file, from the lines that begin at the left margin, and its aliases: name -> what it stands for."""
+    names, aliases, own = set(), {}, False
     for line in source.split("\n"):
         if re.match(r"\}\s*// namespace\s*$", line):
             own = False
@@ -41,7 +42,11 @@ def own_names(source: str) -> set:
         line = re.sub(r"//.*", "", line).rstrip()
         alias = re.match(r"\s*#define\s+(\w+)|using\s+(?:[\w:]*::)?(\w+)\s*[;=]|namespace (\w+) = ", line)
         if alias:
-            names.add(next(name for name in alias.groups() if name))
+            name = next(name for name in alias.groups() if name)
+            if line.lstrip().startswith("#"):
+                names.add(name)
+            else:
+                aliases[name] = line
             continue
         if not line or line[0] in " \t#}{)" or not (own or re.match(r"static |constexpr|const |inline constexpr", line)):
             continue
@@ -56,22 +61,28 @@ def own_names(source: str) -> set:
             if before and not before.endswith("::"):
                 names.add(found.group(1))
             break
-    return names
+    return names, aliases
 
 
 class File:
     def __init__(self, module: str, name: str):
         source = without_texts((ROOT / module / name).read_text())
-        self.name = name
+        self.name, self.test = name, module.startswith("tests/")
         self.length = len(source)
-        self.own = own_names(source)
-        self.words = set(re.findall(r"(?<![.\w])\w+", re.sub(r"//[^\n]*", "", source)))
+        self.own, self.aliases = own_names(source)
+        self.words = set(re.findall(r"(?<![.:\w])\w+", re.sub(r"//[^\n]*", "", source)))
+        self.directives = set(re.findall(r"^using namespace ([\w:]+);", source, re.MULTILINE))
 
     def clash(self, other: "File") -> set:
-        return (self.own & other.words) | (other.own & self.words)
+        names = (self.own & other.words) | (other.own & self.words)
+        for one, two in ((self, other), (other, self)):
+            names |= {name for name, text in one.aliases.items() if name in (two.own if self.test else two.words) and two.aliases.get(name) != text}
+        return names if self.test else names | (self.directives ^ other.directives)
 
 
 def sources(module: str) -> list:
+    if module.startswith("tests/"):
+        return sorted(str(f.relative_to(ROOT / module)) for f in (ROOT / module).rglob("*_test.cpp"))
     folder = ROOT / module / "src"
     files = sorted(f for f in folder.rglob("*.cpp") if f.parent.name != "path")  # compiled by options of its own
     return [str(f.relative_to(ROOT / module)) for f in files]
