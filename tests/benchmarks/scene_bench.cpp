@@ -78,7 +78,7 @@ Scene scene_of(const Case& c, const Settings& settings, double accuracy) {
 /// @param finer  halvings of every step; the error of contact is divided by as much
 Motion run(const Case& c, const Settings& settings, double accuracy, int finer) {
   Scene scene = scene_of(c, settings, accuracy);
-  scene.contact.error = std::max(1e-10, std::ldexp(scene.contact.error, -finer));
+  scene.contact.error = std::max(1e-10, std::ldexp(contact_error(scene), -finer));
   scene.time_step.max_substeps = 1048576;
   const int frames = std::min(scene.frame_count(), 1 + static_cast<int>(std::lround(c.seconds * scene.frame_rate)));
   Simulation simulation(std::move(scene), {.threads = 1, .profile = false, .finer = finer});

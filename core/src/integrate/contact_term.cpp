@@ -98,7 +98,6 @@ void ContactTerm::begin(const ParticleSet& set, const ContactPoints& points, con
   offset_pressure_.resize(count);
   std::vector<Vec3> spin(touched_.size());
   for (std::size_t t = 0; t < touched_.size(); ++t) spin[t] = angular_velocity(set, start, touched_[t]);
-  place(predicted);
   for (std::size_t q = 0; q < count; ++q) {
     const ObstacleSide side = points.pair[pair_of_[q]].obstacle;
     if (side != ObstacleSide::None) start_velocity_[q] = (side == ObstacleSide::B ? -1.0 : 1.0) * points.obstacle_velocity[q];
@@ -107,8 +106,10 @@ void ContactTerm::begin(const ParticleSet& set, const ContactPoints& points, con
       arm_[e] = points.point[q] - predicted.position[i];
       start_velocity_[q] += points.share[e] * (start.velocity[i] + spin[entry_[e]].cross(arm_[e]));
     }
-    offset_pressure_[q] = points.pressure[q] - points.slope[q] * displacement(q).dot(points.normal[q]);
   }
+  placed_.clear();
+  place(predicted);
+  for (std::size_t q = 0; q < count; ++q) offset_pressure_[q] = points.pressure[q] - points.slope[q] * displacement_[q].dot(points.normal[q]);
   split_place_.resize(points.split_particle.size());
   for (std::size_t s = 0; s < split_place_.size(); ++s) split_place_[s] = predicted.position[points.split_particle[s]];
   split_scale_.assign(points.pair.size(), 0.0);
@@ -137,7 +138,7 @@ void ContactTerm::scale_splits() {
   for (std::size_t k = 0; k < p.pair.size(); ++k) {
     double now = 0.0, predicted = 0.0;
     for (std::uint32_t q = p.pair[k].begin; q < p.pair[k].end; ++q) {
-      now += p.weight[q] * std::max(offset_pressure_[q] + p.slope[q] * displacement(q).dot(p.normal[q]), 0.0);
+      now += p.weight[q] * std::max(offset_pressure_[q] + p.slope[q] * displacement_[q].dot(p.normal[q]), 0.0);
       predicted += p.weight[q] * p.pressure[q];
     }
     split_scale_[k] = predicted > 0.0 ? now / predicted : 0.0;
@@ -162,7 +163,11 @@ void ContactTerm::find_coupled() {
   std::sort(coupled_.begin(), coupled_.end());
   coupled_.erase(std::unique(coupled_.begin(), coupled_.end()), coupled_.end());
   block_.clear();
+  as_last_.assign(p.point.size(), 0);
   for (std::size_t q = 0; q < p.point.size(); ++q) {
+    const std::uint32_t begin = p.offset[q], end = p.offset[q + 1], length = end - begin;
+    as_last_[q] = q > 0 && begin - p.offset[q - 1] == length && std::equal(p.particle.begin() + begin, p.particle.begin() + end, p.particle.begin() + begin - length) &&
+                  std::equal(p.share.begin() + begin, p.share.begin() + end, p.share.begin() + begin - length);
     for (std::uint32_t e = p.offset[q]; e < p.offset[q + 1]; ++e) {
       for (std::uint32_t f = p.offset[q]; f < e; ++f) {
         if (p.particle[e] == p.particle[f]) {
@@ -176,17 +181,31 @@ void ContactTerm::find_coupled() {
   }
 }
 
+bool ContactTerm::is_at(const ParticleState& pose) const {
+  if (placed_.size() != touched_.size()) return false;
+  for (std::size_t t = 0; t < touched_.size(); ++t) {
+    const std::uint32_t i = touched_[t];
+    if (placed_[t].position != pose.position[i] || placed_[t].orientation.coeffs() != pose.orientation[i].coeffs()) return false;
+  }
+  return true;
+}
+
 void ContactTerm::place(const ParticleState& pose) {
+  if (is_at(pose)) return;
+  placed_.resize(touched_.size());
   moved_.resize(touched_.size());
   turned_.resize(touched_.size());
   for (std::size_t t = 0; t < touched_.size(); ++t) {
     const std::uint32_t i = touched_[t];
+    placed_[t] = {pose.position[i], pose.orientation[i]};
     moved_[t] = pose.position[i] - start_->position[i];
     turned_[t] = rotation_log(pose.orientation[i] * start_->orientation[i].conjugate());
   }
+  displacement_.resize(points_->point.size());
+  for (std::size_t q = 0; q < displacement_.size(); ++q) displacement_[q] = displacement_of(q);
 }
 
-Vec3 ContactTerm::displacement(std::size_t q) const {
+Vec3 ContactTerm::displacement_of(std::size_t q) const {
   const ContactPoints& p = *points_;
   Vec3 u = Vec3::Zero();
   for (std::uint32_t e = p.offset[q]; e < p.offset[q + 1]; ++e) {
@@ -262,7 +281,7 @@ double ContactTerm::lag_friction(const ParticleState& pose) {
   place(pose);
   double change = 0.0, all = 0.0;
   for (std::size_t q = 0; q < lagged_.size(); ++q) {
-    const double force = normal_force(q, displacement(q).dot(points_->normal[q]));
+    const double force = normal_force(q, displacement_[q].dot(points_->normal[q]));
     change += std::abs(force - lagged_[q]);
     all += force;
     lagged_[q] = force;
@@ -276,7 +295,7 @@ double ContactTerm::value(const ParticleState& pose) {
   place(pose);
   double sum = 0.0;
   for (std::size_t q = 0; q < points_->point.size(); ++q) {
-    const Vec3 u = displacement(q);
+    const Vec3& u = displacement_[q];
     sum += normal_potential(q, u.dot(points_->normal[q]));
     const double most = points_->pair[pair_of_[q]].friction * lagged_[q];
     if (!(most > 0.0)) continue;
@@ -298,7 +317,7 @@ void ContactTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradi
   std::vector<Vec3> force(touched_.size(), Vec3::Zero()), torque(touched_.size(), Vec3::Zero());
   const ContactPoints& p = *points_;
   for (std::size_t q = 0; q < p.point.size(); ++q) {
-    const Vec3 f = gradient_of(q, displacement(q));
+    const Vec3 f = gradient_of(q, displacement_[q]);
     for (std::uint32_t e = p.offset[q]; e < p.offset[q + 1]; ++e) {
       force[entry_[e]] += p.share[e] * f;
       torque[entry_[e]] += p.share[e] * arm_[e].cross(f);
@@ -318,6 +337,23 @@ void ContactTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradi
   }
 }
 
+void ContactTerm::spread(std::size_t q, std::size_t block, const Mat6& stiffness) {
+  const ContactPoints& p = *points_;
+  Mat6 whole = stiffness;
+  whole.bottomLeftCorner<3, 3>() = stiffness.topRightCorner<3, 3>().transpose();
+  for (std::uint32_t e = p.offset[q]; e < p.offset[q + 1]; ++e) {
+    diagonal_[entry_[e]] += p.share[e] * p.share[e] * whole;
+    for (std::uint32_t f = p.offset[q]; f < e; ++f, ++block) {
+      const double shares = p.share[e] * p.share[f];
+      if (p.particle[e] == p.particle[f]) {
+        diagonal_[block_[block]] += 2.0 * shares * whole;
+      } else {
+        off_diagonal_[block_[block]] += shares * whole;
+      }
+    }
+  }
+}
+
 void ContactTerm::add_hessian(const ParticleState& pose, std::size_t first_pair, FrictionHessian friction, StepHessian& hessian) {
   if (empty()) return;
   place(pose);
@@ -325,27 +361,23 @@ void ContactTerm::add_hessian(const ParticleState& pose, std::size_t first_pair,
   off_diagonal_.assign(coupled_.size(), Mat6::Zero());
   const ContactPoints& p = *points_;
   const Vec3 origin = p.point.front();  // near all arms, so that nothing cancels
-  std::size_t block = 0;
+  std::size_t block = 0, first = 0;
+  Mat6 sum = Mat6::Zero();  // of points with the same particles and shares, from `first` on
   for (std::size_t q = 0; q < p.point.size(); ++q) {
-    const Mat3 k = hessian_of(q, displacement(q), friction);
-    const Mat3 cross = cross_matrix(p.point[q] - origin);
-    Mat6 about_origin;
-    about_origin.topLeftCorner<3, 3>() = k;
-    about_origin.topRightCorner<3, 3>() = -k * cross;
-    about_origin.bottomLeftCorner<3, 3>() = cross * k;
-    about_origin.bottomRightCorner<3, 3>() = -cross * k * cross;
-    for (std::uint32_t e = p.offset[q]; e < p.offset[q + 1]; ++e) {
-      diagonal_[entry_[e]] += p.share[e] * p.share[e] * about_origin;
-      for (std::uint32_t f = p.offset[q]; f < e; ++f, ++block) {
-        const double shares = p.share[e] * p.share[f];
-        if (p.particle[e] == p.particle[f]) {
-          diagonal_[block_[block]] += 2.0 * shares * about_origin;
-        } else {
-          off_diagonal_[block_[block]] += shares * about_origin;
-        }
-      }
+    if (q > 0 && !as_last_[q]) {
+      spread(first, block, sum);
+      const std::size_t length = p.offset[first + 1] - p.offset[first];
+      block += (q - first) * (length * (length - 1) / 2);
+      first = q;
+      sum.setZero();
     }
+    const Mat3 k = hessian_of(q, displacement_[q], friction);
+    const Mat3 cross = cross_matrix(p.point[q] - origin), k_cross = k * cross;
+    sum.topLeftCorner<3, 3>() += k;
+    sum.topRightCorner<3, 3>() -= k_cross;
+    sum.bottomRightCorner<3, 3>() -= cross * k_cross;
   }
+  spread(first, block, sum);
   // Twists about `origin` from the displacement and the rotation of each particle.
   std::vector<Mat6> map(touched_.size());
   std::vector<Vec3> centre(touched_.size(), origin);
@@ -389,7 +421,7 @@ void ContactTerm::finish(const ParticleState& pose, double dt, Loads& loads, Led
   place(pose);
   const ContactPoints& p = *points_;
   for (std::size_t q = 0; q < p.point.size(); ++q) {
-    const Vec3 u = displacement(q);
+    const Vec3 u = displacement_[q];
     const Traction traction = traction_of(q, u);
     const Vec3 f = traction.force + traction.dissipative;
     for (std::uint32_t e = p.offset[q]; e < p.offset[q + 1]; ++e) {

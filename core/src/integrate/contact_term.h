@@ -65,8 +65,12 @@ class ContactTerm {
   void find_coupled();
   /// Sums of pressures, without damping, over those at the predicted pose, by pair.
   void scale_splits();
+  /// Moves touched particles and points to the pose; does nothing where they are there.
   void place(const ParticleState& pose);
-  [[nodiscard]] Vec3 displacement(std::size_t q) const;
+  [[nodiscard]] bool is_at(const ParticleState& pose) const;
+  [[nodiscard]] Vec3 displacement_of(std::size_t q) const;
+  /// Adds a stiffness about one origin, its lower left block left out, of points with the entries of point q, to the blocks of its particles. @param block  of the first pair of entries
+  void spread(std::size_t q, std::size_t block, const Mat6& stiffness);
   [[nodiscard]] Vec3 slip(std::size_t q, const Vec3& u) const;
   [[nodiscard]] double normal_force(std::size_t q, double approach) const;
   [[nodiscard]] double normal_potential(std::size_t q, double approach) const;
@@ -89,7 +93,10 @@ class ContactTerm {
   std::vector<Vec3> split_place_;        // centre of its particle at the predicted pose [m]
   std::vector<double> split_scale_;      // by pair, lagged [1]
   std::vector<std::uint32_t> pair_of_;   // by point
+  std::vector<Pose> placed_;             // of the touched particles, at the last call of `place`
   std::vector<Vec3> moved_, turned_;     // since the start, by touched particle [m], [rad]
+  std::vector<Vec3> displacement_;       // of A relative to B since the start, by point [m]
+  std::vector<std::uint8_t> as_last_;    // by point: its particles and their shares are those of the point before it
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coupled_;
   std::vector<std::uint32_t> block_;     // of each pair of entries of each row, in order: into `coupled_`, or touched particle on the diagonal
   std::vector<Mat6> diagonal_, off_diagonal_;

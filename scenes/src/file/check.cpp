@@ -1,3 +1,4 @@
+#include "supple/scenes/accuracy.h"
 #include "supple/scenes/check.h"
 
 #include <algorithm>
@@ -37,7 +38,7 @@ constexpr double kContactError = 0.05;
 
 /// @param limit  of the building; what follows has limits of its own
 void build_and_look(Scene scene, const SimulationOptions& options, WorkLimit& limit, CheckReport& report) {
-  scene.contact.error = std::max(scene.contact.error, kContactError);
+  scene.contact.error = std::max(contact_error(scene), kContactError);
   Simulation simulation(std::move(scene), options);
   limit.lift();
   try {

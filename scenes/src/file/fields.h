@@ -50,14 +50,14 @@ template <class Archive>
 void fields(Archive& archive, IntegratorDesc& d) {
   using enum MethodName;
   archive("method", d.method, {},
-          "auto: symplectic, or backward_euler where stiffness makes that much cheaper; with `accuracy` symplectic or implicit, whichever reaches it at less cost. "
+          "auto: symplectic or implicit_midpoint, whichever reaches the accuracy at less cost; with time_step.size and no `accuracy` symplectic, or backward_euler where stiffness makes that much cheaper. "
           "`supple explain` prints the choice and its reason. backward_euler and implicit_midpoint solve contact and friction within the step, so that bodies held by "
           "friction stay at rest. implicit: implicit_midpoint in steps that resolve contact; backward_euler where the scene fixes steps that do not");
   archive("rotation", d.rotation, Rule{}.only("method", d.method, {Auto, Symplectic}),
           "how free particles rotate. splitting: about one principal axis after another; exponential: once, about the axis at the middle of the step");
   archive("tolerance", d.tolerance,
           between(1e-14, 0.1, kNumber).or_auto().only("method", d.method, {Auto, Adaptive, BackwardEuler, ImplicitMidpoint, Implicit}),
-          "largest local error (adaptive) or last correction (implicit methods), relative to the smallest length, or in radians; auto: 1e-6 (adaptive) or 1e-9 (implicit methods; with `accuracy` a thousandth of it)");
+          "largest local error (adaptive) or last correction (implicit methods), relative to the smallest length, or in radians; auto: 1e-6 (adaptive), or for implicit methods a thousandth of the accuracy, 1e-9 without one");
 }
 
 /// Checks that the particles of pins, loads and primitives exist.
@@ -239,7 +239,7 @@ void fields(Archive& archive, Scene& d) {
   archive("wind", d.wind, {}, "velocity of the medium: the drag of objects with 'medium' is -gamma m (v - wind); absent: at rest");
   archive("planar", d.planar, {}, "motion in a plane: particles keep their z, which must be the same for all, and rotate about z only");
   archive("accuracy", d.accuracy, between(1e-5, 1e-2, kNumber),
-          "error of positions relative to the size of the bodies, until a scene becomes chaotic: sets time step, integrator, contact error, mesh error and noise together, as `supple explain` prints; other keys override what it sets; absent: every stage has its own default");
+          "error of positions relative to the size of the bodies, until a scene becomes chaotic: sets time step, integrator, contact error, mesh error and noise together, as `supple explain` prints; other keys override what it sets; absent: the motion is that of 1e-2 where the scene gives neither time_step.size, time_step.substeps nor integrator.method and every law has an energy; meshes and pictures have their own defaults");
   archive("time_step", d.time_step, {}, "size of the time steps. A run ends with exit code 5 and names the fastest object if nine tenths of its energy come neither from the initial state nor from loads or obstacles. Scenes whose energy does not balance by their own choice are exempt: laws with paper_literal, contact.split: contribution, objects with 'volume', and obstacles with keys in steps that the scene fixes");
   archive("integrator", d.integrator, {}, "method of time integration");
   archive.required("objects", d.objects, Rule{}.items(1, 100000), "deformable objects");

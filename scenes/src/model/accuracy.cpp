@@ -19,9 +19,27 @@ AccuracyRules accuracy_rules(double accuracy) {
 }
 
 void set_by_accuracy(double accuracy, Scene& scene) {
-  const AccuracyRules rules = accuracy_rules(accuracy);
-  scene.contact.error = rules.contact_error;
-  scene.render.noise = rules.noise;
+  scene.render.noise = accuracy_rules(accuracy).noise;
+}
+
+bool leaves_steps_open(const Scene& scene) {
+  const auto literal = [](const ObjectDesc& object) {
+    return std::any_of(object.interactions.begin(), object.interactions.end(), [](const InteractionDesc& law) { return law.paper_literal; });
+  };
+  return !scene.time_step.size && !scene.time_step.substeps && scene.integrator.method == MethodName::Auto &&
+         std::none_of(scene.objects.begin(), scene.objects.end(), literal);
+}
+
+std::optional<double> accuracy_of(const Scene& scene) {
+  if (scene.accuracy) return scene.accuracy;
+  return leaves_steps_open(scene) ? std::optional(kDefaultAccuracy) : std::nullopt;
+}
+
+double contact_error(const Scene& scene) {
+  constexpr double kOwn = 1e-4;  // of scenes without an accuracy
+  if (scene.contact.error) return *scene.contact.error;
+  const std::optional<double> accuracy = accuracy_of(scene);
+  return accuracy ? accuracy_rules(*accuracy).contact_error : kOwn;
 }
 
 core::StepLimits scaled(core::StepLimits limits, const StepBounds& bounds) {

@@ -10,6 +10,7 @@
 #include "supple/core/io/mesh_files.h"
 #include "supple/core/io/read_mesh.h"
 #include "supple/core/math.h"
+#include "supple/scenes/accuracy.h"
 
 namespace supple::scenes {
 namespace {
@@ -459,7 +460,7 @@ double largest_friction(const Model& model) {
 
 void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, ModelFaults& faults) {
   add_fixed_bodies(scene, model, faults);
-  model.contact.error = scene.contact.error;
+  model.contact.error = contact_error(scene);
   model.contact.only = rule_of(scene.contact.rule);
   model.reaction.split = scene.contact.split == SplitName::Energy ? collision::SplitRule::Energy
                                                                   : collision::SplitRule::Contribution;
@@ -503,7 +504,7 @@ void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, Model
     if (!touches) continue;
     model.largest_dissipation = std::max(model.largest_dissipation, object.material.dissipation);
     // Springs of friction need not be accurate, but stable: steps of an accuracy let them have twice the phase.
-    const double sticks = (scene.accuracy ? 0.5 : 1.0) * stick_frequency(object, model.particles, model.reaction.stick);
+    const double sticks = (accuracy_of(scene) ? 0.5 : 1.0) * stick_frequency(object, model.particles, model.reaction.stick);
     model.contact_frequency = std::max(model.contact_frequency, std::hypot(contact_frequency(object, model.particles), sticks));
     if (!needs_samples) continue;
     double thinnest = object.iso_radius;  // obstacles have no samples: those of the object see the thinnest of their shapes

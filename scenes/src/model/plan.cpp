@@ -1,3 +1,4 @@
+#include "supple/scenes/accuracy.h"
 #include "supple/scenes/plan.h"
 
 #include <algorithm>
@@ -109,9 +110,10 @@ std::string meshing_of(const Scene& scene, const Model& model) {
 }
 
 /// Which rule samples the contact surface, and why.
-std::string rule_of_contact(const ContactDesc& d) {
-  if (d.rule != RuleName::Auto) return std::string(name_of(d.rule)) + ": set in the scene";
-  return "auto: panels where the pressure has many maxima, polar where patches are star-shaped about their peak, else samples or march; relative error " + number_text(d.error);
+std::string rule_of_contact(const Scene& scene) {
+  const RuleName rule = scene.contact.rule;
+  if (rule != RuleName::Auto) return std::string(name_of(rule)) + ": set in the scene";
+  return "auto: panels where the pressure has many maxima, polar where patches are star-shaped about their peak, else samples or march; relative error " + number_text(contact_error(scene));
 }
 
 }  // namespace
@@ -173,7 +175,7 @@ StepPlan plan_step(const Scene& scene, const Model& model, const OutputRequest& 
                                                          : "fewer than two bodies may touch");
   add(Stage::SampleSurface, contact, contact ? contact_reason + "; only parts near another body are sampled" : contact_reason);
   add(Stage::FindContacts, contact, contact_reason);
-  add(Stage::SolveContactSurface, contact, contact ? "runs when find_contacts leaves a pair; " + rule_of_contact(scene.contact) : contact_reason);
+  add(Stage::SolveContactSurface, contact, contact ? "runs when find_contacts leaves a pair; " + rule_of_contact(scene) : contact_reason);
   add(Stage::React, contact, contact ? "runs when a contact surface was found" : contact_reason);
   add(Stage::Integrate, true, plan_integrator(scene, model).reason);
 
@@ -279,9 +281,8 @@ void choose_by_stability(const Scene& scene, const Model& model, const StepCount
                 (refused ? ", which are more than time_step.max_substeps" : "; damps motion that its steps do not resolve");
 }
 
-/// `auto` with it.
-void choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts& counts, IntegratorPlan& plan) {
-  const double accuracy = *scene.accuracy;
+/// `auto` with it. @return false: the scene does not allow as many steps
+bool choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts& counts, double accuracy, IntegratorPlan& plan) {
   const AccuracyRules rules = accuracy_rules(accuracy);
   const double stable = counts.of(std::hypot(plan.pair_frequency, model.contact_frequency), rules.explicit_steps);
   const double friction = counts.to_resolve_friction(accuracy), damping = counts.to_resolve_damping(plan.damping_rate, accuracy);
@@ -289,12 +290,14 @@ void choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts
   const double implicit_steps = counts.of(counts.resolved(plan.pair_frequency), rules.implicit_steps);
   const bool dissipates = explicit_steps > stable, touches = model.contact_frequency > 0.0;
   const double cost = !dissipates ? kImplicitCost : touches ? kImplicitStepCost : implicit_pair_cost(model.particles.size());
-  const bool implicit = suits_implicit(model) && explicit_steps > cost * implicit_steps;
+  const bool refused = explicit_steps > scene.time_step.max_substeps;
+  const bool implicit = suits_implicit(model) && (refused || explicit_steps > cost * implicit_steps);
   plan.settings.method = implicit ? core::Integrator::ImplicitMidpoint : core::Integrator::Symplectic;
   plan.reason = std::string(implicit ? "implicit_midpoint" : "symplectic") + ": accuracy " + number_text(accuracy) + " takes " +
                 number_text(implicit_steps) + " implicit steps per frame, or " + number_text(explicit_steps) + " of velocity Verlet" +
                 (!dissipates ? "" : friction < damping ? ", to resolve damping between particles" : ", to resolve friction") +
-                "; an implicit step costs as much as " + number_text(std::round(cost));
+                (refused ? ", which are more than time_step.max_substeps" : "; an implicit step costs as much as " + number_text(std::round(cost)));
+  return (implicit ? implicit_steps : explicit_steps) <= scene.time_step.max_substeps;
 }
 
 /// The method `implicit`.
@@ -312,15 +315,15 @@ void take_implicit(const Scene& scene, const Model& model, const StepCounts& cou
 }
 
 /// What follows from the method.
-void set_limits(const Scene& scene, const Model& model, const StepCounts& counts, IntegratorPlan& plan) {
+void set_limits(const Scene& scene, const Model& model, const StepCounts& counts, const std::optional<double>& accuracy, IntegratorPlan& plan) {
   const bool implicit = core::is_implicit(plan.settings.method);
   const double all = std::hypot(plan.pair_frequency, model.contact_frequency);
-  const double by_accuracy = scene.accuracy ? accuracy_rules(*scene.accuracy).tolerance : 1e-9;
+  const double by_accuracy = accuracy ? accuracy_rules(*accuracy).tolerance : 1e-9;
   plan.settings.tolerance = scene.integrator.tolerance.value_or(implicit ? by_accuracy : 1e-6);
-  const bool resolves = scene.accuracy || scene.integrator.method == MethodName::Implicit;
+  const bool resolves = accuracy || scene.integrator.method == MethodName::Implicit;
   plan.limiting_frequency = !implicit ? all : !plan.chosen ? 0.0 : resolves ? counts.resolved(plan.pair_frequency) : model.contact_frequency;
-  if (!implicit && scene.accuracy && plan.chosen) {
-    const double steps = std::max(counts.to_resolve_friction(*scene.accuracy), counts.to_resolve_damping(plan.damping_rate, *scene.accuracy));
+  if (!implicit && accuracy && plan.chosen) {
+    const double steps = std::max(counts.to_resolve_friction(*accuracy), counts.to_resolve_damping(plan.damping_rate, *accuracy));
     if (std::isfinite(steps)) plan.limiting_frequency = std::max(all, plan.bounds.phase * steps / counts.frame());
   }
   if (plan.settings.method == core::Integrator::Adaptive) {
@@ -344,16 +347,18 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
   plan.settings.max_substeps = scene.time_step.max_substeps;
   const MethodName method = scene.integrator.method;
   plan.chosen = (method == MethodName::Auto || method == MethodName::Implicit) && !scene.time_step.substeps;
-  const AccuracyRules rules = accuracy_rules(scene.accuracy.value_or(kDefaultAccuracy));
+  std::optional<double> accuracy = accuracy_of(scene);
+  const AccuracyRules rules = accuracy_rules(accuracy.value_or(kDefaultAccuracy));
   if (method == MethodName::Implicit) plan.bounds = rules.implicit_steps;
   switch (method) {
     case MethodName::Auto:
       if (!plan.chosen) {
         plan.reason = "symplectic: the scene fixes the time step";
-      } else if (scene.accuracy) {
-        choose_by_accuracy(scene, model, counts, plan);
       } else {
-        choose_by_stability(scene, model, counts, plan);
+        const bool reached = accuracy && choose_by_accuracy(scene, model, counts, *accuracy, plan);
+        // Waves too stiff for the default accuracy are left unresolved; an accuracy that the scene gives is not.
+        if (!reached) accuracy = scene.accuracy;
+        if (!accuracy) choose_by_stability(scene, model, counts, plan);
       }
       break;
     case MethodName::Symplectic: plan.settings.method = Integrator::Symplectic; break;
@@ -364,9 +369,9 @@ IntegratorPlan plan_integrator(const Scene& scene, const Model& model) {
     case MethodName::Implicit: take_implicit(scene, model, counts, plan); break;
   }
   if (plan.reason.empty()) plan.reason = std::string(name_of(method)) + ": given by the scene";
-  if (scene.accuracy) plan.bounds = core::is_implicit(plan.settings.method) ? rules.implicit_steps : rules.explicit_steps;
-  if (scene.accuracy) plan.slow_slip = rules.slow_slip;
-  set_limits(scene, model, counts, plan);
+  if (accuracy) plan.bounds = core::is_implicit(plan.settings.method) ? rules.implicit_steps : rules.explicit_steps;
+  if (accuracy) plan.slow_slip = rules.slow_slip;
+  set_limits(scene, model, counts, accuracy, plan);
   return plan;
 }
 

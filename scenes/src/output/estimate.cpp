@@ -1,3 +1,4 @@
+#include "supple/scenes/accuracy.h"
 #include "supple/scenes/estimate.h"
 
 #include <sys/resource.h>
@@ -76,7 +77,7 @@ std::vector<int> sample_of(int last) {
 
 Coarse follow(const Scene& scene, const SimulationOptions& options, int last, double limit) {
   Scene rough = scene;
-  rough.contact.error = std::max(scene.contact.error, kCoarseContact);
+  rough.contact.error = std::max(contact_error(scene), kCoarseContact);
   Simulation simulation(std::move(rough), options);
   Coarse out;
   const std::vector<int> wanted = sample_of(last);

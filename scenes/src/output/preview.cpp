@@ -17,15 +17,6 @@ constexpr double kContactError = 3e-2;  // of force and area
 /// Video formats take even edges only.
 int smaller(int edge) { return std::max(kLeastEdge, edge / kSmaller / 2 * 2); }
 
-/// Whether `accuracy` may choose steps and method: nothing of the scene does, and every law has an energy.
-bool leaves_steps_open(const Scene& scene) {
-  const auto literal = [](const ObjectDesc& object) {
-    return std::any_of(object.interactions.begin(), object.interactions.end(), [](const InteractionDesc& law) { return law.paper_literal; });
-  };
-  return !scene.time_step.size && !scene.time_step.substeps && scene.integrator.method == MethodName::Auto &&
-         std::none_of(scene.objects.begin(), scene.objects.end(), literal);
-}
-
 void add_meshing(const Scene& scene, std::vector<std::string>& out) {
   const Model model = build_model(scene);
   if (!(model.cell > 0.0)) return;
@@ -47,8 +38,8 @@ std::vector<std::string> preview_overrides(const Scene& scene) {
   out.push_back("output.images={size: [" + std::to_string(smaller(size.at(0))) + ", " + std::to_string(smaller(size.at(1))) + "], samples: 1}");
   if (!scene.output.film) out.emplace_back("output.film=true");
   out.emplace_back("render.renderer=gl");
-  out.push_back("contact.error=" + number_text(std::max(scene.contact.error, kContactError)));
-  if (leaves_steps_open(scene)) out.push_back("accuracy=" + number_text(kDefaultAccuracy));
+  out.push_back("contact.error=" + number_text(std::max(contact_error(scene), kContactError)));
+  if (scene.accuracy && leaves_steps_open(scene)) out.push_back("accuracy=" + number_text(kDefaultAccuracy));
   add_meshing(scene, out);
   return out;
 }

@@ -12,6 +12,7 @@
 #include "simulation/contact_work.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/scenes/accuracy.h"
 
 namespace supple::scenes {
 namespace {
@@ -46,7 +47,8 @@ ordered_json json_of(const ErrorEstimate& error) {
 /// Estimates by stage, and which is largest; null: not known.
 ordered_json json_of(const Scene& scene, const StageErrors& errors) {
   const std::array<std::pair<const char*, const ErrorEstimate*>, 3> stages{{{"time", &errors.time}, {"contact", &errors.contact}, {"mesh", &errors.mesh}}};
-  ordered_json json = {{"accuracy", scene.accuracy ? ordered_json(*scene.accuracy) : ordered_json(nullptr)}};
+  const std::optional<double> accuracy = accuracy_of(scene);
+  ordered_json json = {{"accuracy", accuracy ? ordered_json(*accuracy) : ordered_json(nullptr)}};
   const char* largest = nullptr;
   double most = 0.0;
   for (const auto& [name, error] : stages) {

@@ -55,9 +55,10 @@ double StageErrorEstimator::end(const Simulation& simulation) {
   if (seen_[kind_]++ % kEvery[kind_] != 0) return 0.0;
   const double began = thread_cpu_seconds();
   const bool whole = simulation.state().halvings == 0;
-  compare(simulation, whole ? 1 : -1, scene_.contact.error, whole ? finer_ : coarser_);
-  const double finer_contact = std::max(kFinestContact, kFinerContact * scene_.contact.error);
-  if (scene_.accuracy && finer_contact < scene_.contact.error) compare(simulation, 0, finer_contact, contact_);
+  const double error = contact_error(scene_);
+  compare(simulation, whole ? 1 : -1, error, whole ? finer_ : coarser_);
+  const double finer_contact = std::max(kFinestContact, kFinerContact * error);
+  if (accuracy_of(scene_) && finer_contact < error) compare(simulation, 0, finer_contact, contact_);
   return thread_cpu_seconds() - began;
 }
 

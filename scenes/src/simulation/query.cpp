@@ -1,3 +1,4 @@
+#include "supple/scenes/accuracy.h"
 #include "supple/scenes/query.h"
 
 #include <algorithm>
@@ -329,11 +330,11 @@ std::string explain(Simulation& simulation) {
        scene.time_step.substeps ? ", fixed by the scene"
                                 : scene.time_step.size ? ", by time_step.size and the stability limits at frame 1"
                                                        : ", by the stability limits at frame 1");
-  if (scene.accuracy) {
-    line("accuracy %g of the size of the bodies: contact.error %g, Newton's method to %g, slips below %g of a pair's speed may stick", *scene.accuracy,
-         scene.contact.error, simulation.integrator().settings.tolerance, simulation.integrator().slow_slip);
+  if (const std::optional<double> accuracy = accuracy_of(scene)) {
+    line("accuracy %g of the size of the bodies%s: contact.error %g, Newton's method to %g, slips below %g of a pair's speed may stick", *accuracy,
+         scene.accuracy ? "" : " (default)", contact_error(scene), simulation.integrator().settings.tolerance, simulation.integrator().slow_slip);
     for (const ObjectModel& o : model.objects) {
-      line("  %-16s %s m%s", o.name.c_str(), short_text(*scene.accuracy * size_of(o)).c_str(),
+      line("  %-16s %s m%s", o.name.c_str(), short_text(*accuracy * size_of(o)).c_str(),
            o.mesh_error ? (", meshes to " + short_text(*o.mesh_error) + " m").c_str() : "");
     }
   }

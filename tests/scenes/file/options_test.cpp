@@ -99,7 +99,7 @@ void add_motion(std::vector<Option>& all) {
     in_scene("integrator.method=" + std::string(method), "integrator: {method: $}", "symplectic", method);
   }
   all.push_back(differs("integrator.method=auto", In::State,
-                        {.interactions = "{law: bond_frame, stretch: 1e10, rotation: 0.5}", .scene = "integrator: {method: $}"},
+                        {.interactions = "{law: bond_frame, stretch: 1e10, rotation: 0.5}", .scene = "integrator: {method: $}\ntime_step: {size: 50 ms}"},
                         "symplectic", "auto"));
   all.push_back(differs("integrator.rotation=exponential", In::State,
                         {.particles = "arrange: single, inertia_axes: [0.1, 0.2, 0.3], spin: [1, 2, 3]", .interactions = "",

@@ -33,16 +33,31 @@ objects:
 Scene read(const std::string& text) { return parse_scene(text, "test.yaml", "."); }
 
 TEST(AccuracyKey, SetsWhatNoKeyGives) {
-  EXPECT_EQ(read(ball("", 0.5)).contact.error, ContactDesc{}.error);
   const Scene fine = read(ball("accuracy: 1e-3", 0.5));
-  EXPECT_EQ(fine.contact.error, 1e-3);
-  const Scene given = read(ball("contact: {error: 1e-6}\naccuracy: 1e-3", 0.5));
-  EXPECT_EQ(given.contact.error, 1e-6);
+  EXPECT_EQ(accuracy_of(fine), 1e-3);
+  EXPECT_EQ(contact_error(fine), 1e-3);
+  EXPECT_EQ(contact_error(read(ball("contact: {error: 1e-6}\naccuracy: 1e-3", 0.5))), 1e-6);
   const Model model = build_model(fine);
   EXPECT_EQ(*model.objects[0].mesh_error, 1e-3 * size_of(model.objects[0]));
   EXPECT_EQ(*build_model(read(ball("accuracy: 1e-3\noutput: {meshing: {error: 0.004}}", 0.5))).objects[0].mesh_error, 0.004);
   EXPECT_EQ(plan_integrator(fine, model).settings.tolerance, 1e-6);
   EXPECT_EQ(plan_integrator(read(ball("accuracy: 1e-3\nintegrator: {tolerance: 1e-8}", 0.5)), model).settings.tolerance, 1e-8);
+}
+
+// Without the key the motion is that of 1e-2, unless the scene fixes its steps or its method; meshes keep their own default.
+TEST(AccuracyKey, HasADefaultWhereStepsAreOpen) {
+  const Scene open = read(ball("", 0.5));
+  EXPECT_EQ(accuracy_of(open), 1e-2);
+  EXPECT_EQ(contact_error(open), 1e-2);
+  EXPECT_EQ(Simulation(open).time_step(), Simulation(read(ball("accuracy: 1e-2", 0.5))).time_step());
+  EXPECT_FALSE(build_model(open).objects[0].mesh_error.has_value());
+  EXPECT_TRUE(build_model(read(ball("accuracy: 1e-2", 0.5))).objects[0].mesh_error.has_value());
+  EXPECT_EQ(contact_error(read(ball("contact: {error: 1e-6}", 0.5))), 1e-6);
+  for (const char* fixed : {"time_step: {size: 1 ms}", "time_step: {substeps: 64}", "integrator: {method: rk4}"}) {
+    const Scene scene = read(ball(fixed, 0.5));
+    EXPECT_EQ(accuracy_of(scene), std::nullopt) << fixed;
+    EXPECT_EQ(contact_error(scene), 1e-4) << fixed;
+  }
 }
 
 TEST(AccuracyKey, TakesStepsThatGrowWithItsRoot) {
@@ -59,7 +74,8 @@ TEST(AccuracyKey, ChoosesByWhatItsErrorCosts) {
   EXPECT_EQ(slides.settings.method, core::Integrator::ImplicitMidpoint);
   EXPECT_NE(slides.reason.find("of velocity Verlet, to resolve friction"), std::string::npos) << slides.reason;
   EXPECT_EQ(smooth.settings.method, core::Integrator::Symplectic);
-  EXPECT_EQ(choice(ball("", 0.5)).settings.method, core::Integrator::Symplectic);
+  EXPECT_EQ(choice(ball("", 0.5)).settings.method, core::Integrator::ImplicitMidpoint);
+  EXPECT_EQ(choice(ball("time_step: {size: 1 ms}", 0.5)).settings.method, core::Integrator::Symplectic);
   // Explicit steps that the scene selects by name are as short as friction needs them.
   EXPECT_EQ(choice(ball("accuracy: 1e-2\nintegrator: {method: symplectic}", 0.5)).settings.method, core::Integrator::Symplectic);
 }

@@ -59,7 +59,7 @@ class Run : public testing::Test {
   Scene scene_;
 };
 
-// A stiff pendulum without damping that falls from the level of its pivot.
+// A stiff pendulum without damping that falls from the level of its pivot, in steps that the scene bounds.
 TEST_F(Run, SaysWhenStepsThatNobodyAskedForDampTheMotion) {
   const auto warnings_of = [&](const std::string& integrator) {
     const Scene scene = parse_scene(R"(
@@ -72,6 +72,7 @@ objects:
     particles: {arrange: line, count: 2, spacing: 1, inertia_radius: 1 mm}
     interactions: [{law: bond_frame, stretch: 1e5, rotation: 0}]
     pins: [{particle: 0, orientation: false}]
+time_step: {size: 10 ms}
 integrator: {method: )" + integrator + "}", "pendulum.yaml", ".");
     RunOptions settings = options();
     settings.overwrite = true;

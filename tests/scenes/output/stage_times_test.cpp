@@ -13,7 +13,7 @@ namespace {
 
 /// CPU time of the stages of a spiral that is hit, over that of the process.
 double share_of_stages(bool profile, const std::string& duration, double& advance) {
-  const std::vector<std::string> quiet{"output={}", "duration=" + duration};
+  const std::vector<std::string> quiet{"output={}", "integrator.method=symplectic", "duration=" + duration};
   Simulation simulation(library_scene("figures/ball_hits_spiral", quiet), {.profile = profile});
   const double begin = process_cpu_seconds();
   run(simulation, simulation.scene().frame_count());

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "supple/core/error.h"
+#include "supple/scenes/accuracy.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
@@ -113,17 +114,33 @@ TEST(IntegratorKey, KeepsTheBitsOfARestartAndOfEveryNumberOfThreads) {
   }
 }
 
-TEST(IntegratorKey, LeavesTheLibraryToVelocityVerlet) {
+TEST(IntegratorKey, OfTheLibraryFollowsFromTheDefaultAccuracy) {
+  int chosen = 0;
   for (const auto& entry : fs::recursive_directory_iterator(source_dir() / "scenes/library")) {
     if (entry.path().extension() != ".yaml") continue;
     const Scene scene = read_scene(entry.path());
-    if (scene.integrator.method != MethodName::Auto) continue;
-    EXPECT_EQ(plan_integrator(scene, build_model(scene)).settings.method, core::Integrator::Symplectic) << entry.path();
+    if (!leaves_steps_open(scene)) continue;
+    const std::string reason = plan_integrator(scene, build_model(scene)).reason;
+    EXPECT_NE(reason.find(": accuracy 0.01 takes "), std::string::npos) << entry.path() << ": " << reason;
+    ++chosen;
   }
+  EXPECT_GE(chosen, 30);
 }
 
-TEST(IntegratorKey, ChoosesBackwardEulerWhereVelocityVerletWouldNeedFarMoreSteps) {
-  Simulation soft = make(chain("")), stiff = make(chain("", "1e9"));
+// The default accuracy gives way where it needs more steps than are allowed; one that the scene gives does not.
+TEST(IntegratorKey, LeavesWavesUnresolvedThatAreTooStiffForTheDefaultAccuracy) {
+  Simulation stiff = make(chain("", "1e9"));
+  EXPECT_EQ(stiff.integrator().settings.method, core::Integrator::BackwardEuler);
+  EXPECT_NE(explain(stiff).find("which are more than time_step.max_substeps"), std::string::npos) << explain(stiff);
+  run(stiff, 4);
+  EXPECT_TRUE(stiff.integration().within_tolerance);
+  EXPECT_THROW(make(chain("accuracy: 1e-2", "1e9")), Error);
+  EXPECT_EQ(make(chain("", "1e5")).integrator().settings.method, core::Integrator::Symplectic);
+}
+
+TEST(IntegratorKey, ChoosesBackwardEulerWhereVelocityVerletWouldNeedFarMoreStepsThanTheSceneBounds) {
+  const std::string bound = "time_step: {size: 50 ms}";
+  Simulation soft = make(chain(bound)), stiff = make(chain(bound, "1e9"));
   EXPECT_EQ(soft.integrator().settings.method, core::Integrator::Symplectic);
   EXPECT_EQ(stiff.integrator().settings.method, core::Integrator::BackwardEuler);
   EXPECT_TRUE(stiff.integrator().chosen);
@@ -132,9 +149,10 @@ TEST(IntegratorKey, ChoosesBackwardEulerWhereVelocityVerletWouldNeedFarMoreSteps
   run(stiff, 8);
   EXPECT_TRUE(stiff.integration().within_tolerance);
   // Also where Verlet is allowed all the steps it needs, 2^14 a frame instead of 2^2.
-  Simulation allowed = make(chain("time_step: {max_substeps: 1048576}", "1e9"));
+  const std::string allowing = "time_step: {size: 50 ms, max_substeps: 1048576}";
+  Simulation allowed = make(chain(allowing, "1e9"));
   EXPECT_EQ(allowed.integrator().settings.method, core::Integrator::BackwardEuler);
-  EXPECT_EQ(make(chain("time_step: {max_substeps: 1048576}", "1e5")).integrator().settings.method,
+  EXPECT_EQ(make(chain(allowing, "1e5")).integrator().settings.method,
             core::Integrator::Symplectic);
   // A step that the scene fixes is taken as it is.
   Simulation fixed = make(chain("time_step: {substeps: 4}", "1e9"));

@@ -60,7 +60,7 @@ TEST(Stick, HoldsATableBelowTheAngleOfFriction) {
   EXPECT_LT(r.energy_returned, 1e-8 * r.largest_energy);  // springs give back what they hold, step by step
   EXPECT_GT(s.state().ledger.dissipated, 0.0);
 
-  Simulation creeps = make(table(0.5, ""));
+  Simulation creeps = make(table(0.5, "") + "integrator: {method: symplectic}\n");
   run(creeps, 30);
   const double before = down(creeps);
   run(creeps, 24);
@@ -112,7 +112,8 @@ TEST(Stick, LetsAStackOfTenInAShaftThatGrowsHeavierUpwardFallAsleep) {
 }
 
 TEST(Stick, LetsAHundredBallsInABinComeToRestAndSleep) {
-  Simulation s(read_scene(source_dir() / "scenes/library/contacts/pile_rests.yaml"), {.threads = 2});
+  const std::vector<std::string> finer{"accuracy=2.5e-3"};
+  Simulation s(read_scene(source_dir() / "scenes/library/contacts/pile_rests.yaml", finer), {.threads = 2});
   run(s, 73);  // three seconds
   const State& state = s.state();
   ASSERT_EQ(state.particles.position.size(), 100u);

@@ -1,6 +1,7 @@
 /// @file supple/scenes/accuracy.h
 /// The key `accuracy`: one number a, the error of positions over the size of the bodies, from which the parameters of every stage follow. Keys that a
-/// scene gives override them.
+/// scene gives override them. A scene without the key that fixes neither its steps nor its method moves by a = 1e-2; its meshes and pictures keep their own
+/// defaults.
 ///
 /// | stage    | key                     | rule                                   | why                                                        |
 /// |----------|-------------------------|----------------------------------------|------------------------------------------------------------|
@@ -14,6 +15,7 @@
 /// Samples only find contacts; their spacing stays a sixth of the smallest feature.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "supple/core/integrate.h"
@@ -21,7 +23,7 @@
 
 namespace supple::scenes {
 
-/// Accuracy of the method `implicit` where a scene gives none.
+/// Accuracy of the motion where a scene gives none.
 inline constexpr double kDefaultAccuracy = 1e-2;
 
 /// Bounds of one time step.
@@ -57,8 +59,17 @@ struct StageErrors {
 /// @param accuracy  in [1e-5, 1e-2]
 [[nodiscard]] AccuracyRules accuracy_rules(double accuracy);
 
-/// Sets the keys that follow from an accuracy. @pre no keys have been read into the scene yet
+/// Sets the keys of pictures that follow from an accuracy. @pre no keys have been read into the scene yet
 void set_by_accuracy(double accuracy, Scene& scene);
+
+/// Whether a scene says nothing of its steps and of the method, and every law has an energy, as methods that `accuracy` chooses among need.
+[[nodiscard]] bool leaves_steps_open(const Scene& scene);
+
+/// Accuracy of the motion: that of the scene, or the default of a scene that leaves its steps open; none where the scene fixes them.
+[[nodiscard]] std::optional<double> accuracy_of(const Scene& scene);
+
+/// Relative error of contact that a scene asks for, by its key or its accuracy [1].
+[[nodiscard]] double contact_error(const Scene& scene);
 
 /// Limits for `core::stable_step`, which keeps to the default bounds, so that its step keeps to these.
 [[nodiscard]] core::StepLimits scaled(core::StepLimits limits, const StepBounds& bounds);

@@ -341,7 +341,7 @@ struct StickDesc {
 
 /// contact: of the scene
 struct ContactDesc {
-  double error = 1e-4;
+  std::optional<double> error;        ///< of force and area, relative [1]; absent: as the accuracy, or 1e-4 where steps are fixed
   RuleName rule = RuleName::Auto;
   SplitName split = SplitName::Energy;
   CoreName core = CoreName::Soft;
@@ -472,7 +472,7 @@ struct Scene {
   std::optional<CourseDesc> gravity_course;  ///< a factor of gravity
   std::optional<WindDesc> wind;       ///< absent: the medium is at rest
   bool planar = false;                ///< particles keep their z and turn about z only
-  std::optional<double> accuracy;     ///< over the size of the bodies [1]; absent: every stage by its own keys
+  std::optional<double> accuracy;     ///< over the size of the bodies [1]; absent: see accuracy.h
   TimeStepDesc time_step;
   IntegratorDesc integrator;
   std::vector<ObjectDesc> objects;    ///< sorted by name
