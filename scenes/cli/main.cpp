@@ -110,6 +110,7 @@ struct Arguments {
   bool overwrite = false;
   bool resume = false;
   bool simulate_only = false;
+  bool no_pictures = false;
   bool render_only = false;
   bool dry_run = false;
   bool preview = false;
@@ -145,6 +146,7 @@ int report(const scenes::RunResult& result, const Arguments& arguments) {
     print(std::cout, "folder: %s\n", result.folder.c_str());
     if (result.pictures_kept > 0) print(std::cout, "frames: %d drawn, %d kept\n", result.pictures_drawn, result.pictures_kept);
     if (!result.film.empty()) print(std::cout, "film:   %s\n", result.film.c_str());
+    if (result.film_is_left) print(std::cout, "film:   left to the other processes that draw here\n");
     print(std::cout, "result: %s (state %s)\n", result.report.c_str(), to_hex(result.state_hash).c_str());
     if (arguments.profile) print_profile(result);
   }
@@ -178,6 +180,7 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
   options.simulate_only = arguments.simulate_only;
+  options.no_pictures = arguments.no_pictures;
   options.profile = arguments.profile;
   options.context = arguments.context;
   options.frames_at_once = arguments.at_once;
@@ -416,6 +419,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder, whatever its scene");
   run_verb->add_flag("--resume", a.resume, "continue from the saved states in the folder; frames whose states are lost or damaged are simulated again");
   run_verb->add_flag("--simulate-only", a.simulate_only, "no pictures, film, meshes, grids or samples");
+  run_verb->add_flag("--no-pictures", a.no_pictures, "no pictures and no film, which `supple render` makes, in several processes at the same time if that is wanted");
   drawing_flags(run_verb, a);
   time_flag(run_verb, a, "stop after this many seconds, between two steps; --resume continues from the last saved state");
   run_verb->add_flag("--view", a.view, "serve a page to this machine that follows the run (`supple view`)");
