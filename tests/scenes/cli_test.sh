@@ -51,6 +51,7 @@ expect 3 "found 'cube'" check missing_object.yaml
 expect 4 'absent.yaml' check absent.yaml
 expect 4 'plain_file' run good.yaml --out plain_file/out --progress none
 expect 4 '--overwrite' run good.yaml --out good --progress none
+expect 0 '' --version
 expect 2 '' run
 expect 2 "supple: expected a command, found 'rn'; did you mean 'run'? (known: run, render" rn good.yaml
 expect 2 "found 'simulate'; known: run, render, export, view, info, compare, check, explain, query, bench, reference" simulate good.yaml
