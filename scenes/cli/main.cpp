@@ -449,7 +449,9 @@ int parse_and_call(int argc, char** argv, bool silent) {
   drawing_flags(render_verb, a);
   fingerprint_option(render_verb, a);
   render_verb->add_flag("--sheet", a.sheet, "make only the contact sheet, from the existing pictures");
-  render_verb->footer(std::string(kFilmRule) + "Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
+  render_verb->footer(std::string(kFilmRule) +
+                      "Several processes may draw frames of one run at the same time, all in one look. One that finds all frames drawn makes the film.\n\n"
+                      "Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
 
   CLI::App* export_verb = app.add_subcommand("export", "write files for other tools from the saved states of a run");
   run_flags(export_verb, a);
