@@ -124,7 +124,10 @@ std::string quoted(const std::string& word) {
 
 std::string array_of(const Words& words) {
   std::string text = "(";
-  for (const std::string& word : words) text += (text.size() > 1 ? " " : "") + quoted(word);
+  for (const std::string& word : words) {
+    if (text.size() > 1) text += ' ';
+    text += quoted(word);
+  }
   return text + ')';
 }
 
