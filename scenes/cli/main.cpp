@@ -21,6 +21,7 @@
 
 #include "benchmarks.h"
 #include "describe.h"
+#include "job.h"
 #include "last_resort.h"
 #include "library.h"
 #include "print.h"
@@ -37,6 +38,7 @@
 #include "supple/scenes/estimate.h"
 #include "supple/scenes/gltf.h"
 #include "supple/scenes/inspect.h"
+#include "supple/scenes/job.h"
 #include "supple/scenes/limits.h"
 #include "supple/scenes/preview.h"
 #include "supple/scenes/query.h"
@@ -98,6 +100,7 @@ struct Arguments {
   std::string particles;
   std::string contacts;
   std::string sample_tables;
+  std::string fingerprint;
   std::vector<std::string> words;
   int threads = 0;
   int at_once = 0;
@@ -110,6 +113,7 @@ struct Arguments {
   bool overwrite = false;
   bool resume = false;
   bool simulate_only = false;
+  bool no_pictures = false;
   bool render_only = false;
   bool dry_run = false;
   bool preview = false;
@@ -145,6 +149,7 @@ int report(const scenes::RunResult& result, const Arguments& arguments) {
     print(std::cout, "folder: %s\n", result.folder.c_str());
     if (result.pictures_kept > 0) print(std::cout, "frames: %d drawn, %d kept\n", result.pictures_drawn, result.pictures_kept);
     if (!result.film.empty()) print(std::cout, "film:   %s\n", result.film.c_str());
+    if (result.film_is_left) print(std::cout, "film:   left to the other processes that draw here\n");
     print(std::cout, "result: %s (state %s)\n", result.report.c_str(), to_hex(result.state_hash).c_str());
     if (arguments.profile) print_profile(result);
   }
@@ -178,6 +183,7 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
   options.simulate_only = arguments.simulate_only;
+  options.no_pictures = arguments.no_pictures;
   options.profile = arguments.profile;
   options.context = arguments.context;
   options.frames_at_once = arguments.at_once;
@@ -204,6 +210,7 @@ tool::ProgressBar make_bar(const Arguments& arguments) {
 scenes::Scene read_for_run(const Arguments& arguments) {
   try {
     scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
+    if (!arguments.fingerprint.empty()) scenes::expect_fingerprint(scene, arguments.fingerprint);
     if (!arguments.preview) return scene;
     std::vector<std::string> set = scenes::preview_overrides(scene);
     set.insert(set.begin(), arguments.set.begin(), arguments.set.end());
@@ -248,6 +255,7 @@ int run(const Arguments& arguments) {
 
 int render(const Arguments& arguments) {
   const scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
+  if (!arguments.fingerprint.empty()) scenes::expect_fingerprint(scene, arguments.fingerprint);
   if (arguments.sheet) {
     for (const auto& sheet : scenes::make_sheets(scene, folder_of(scene, arguments))) print(std::cout, "sheet:  %s\n", sheet.c_str());
     return 0;
@@ -395,6 +403,10 @@ void time_flag(CLI::App* verb, Arguments& a, const std::string& what) {
       ->check([](const std::string& text) { return number_in(text) > 0.0 ? std::string() : "expected a number > 0 [s], found " + text; });
 }
 
+void fingerprint_option(CLI::App* verb, Arguments& a) {
+  verb->add_option("--fingerprint", a.fingerprint, "refuse a scene of another fingerprint; job files (`supple job`) hold that of their scene");
+}
+
 void drawing_flags(CLI::App* verb, Arguments& a) {
   verb->add_option("--at-once", a.at_once, "frames drawn at the same time (default: one per thread, as memory allows); does not change results")
       ->check(CLI::Range(0, 64));
@@ -416,6 +428,8 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder, whatever its scene");
   run_verb->add_flag("--resume", a.resume, "continue from the saved states in the folder; frames whose states are lost or damaged are simulated again");
   run_verb->add_flag("--simulate-only", a.simulate_only, "no pictures, film, meshes, grids or samples");
+  run_verb->add_flag("--no-pictures", a.no_pictures, "no pictures and no film, which `supple render` makes, in several processes at the same time if that is wanted");
+  fingerprint_option(run_verb, a);
   drawing_flags(run_verb, a);
   time_flag(run_verb, a, "stop after this many seconds, between two steps; --resume continues from the last saved state");
   run_verb->add_flag("--view", a.view, "serve a page to this machine that follows the run (`supple view`)");
@@ -433,8 +447,11 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_flags(render_verb, a);
   render_verb->add_flag("--overwrite", a.overwrite, "draw all pictures again, also those that are up to date");
   drawing_flags(render_verb, a);
+  fingerprint_option(render_verb, a);
   render_verb->add_flag("--sheet", a.sheet, "make only the contact sheet, from the existing pictures");
-  render_verb->footer(std::string(kFilmRule) + "Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
+  render_verb->footer(std::string(kFilmRule) +
+                      "Several processes may draw frames of one run at the same time, all in one look. One that finds all frames drawn makes the film.\n\n"
+                      "Example: supple render scenes/library/contacts/two_balls.yaml --out out/two_balls --frames 10-20");
 
   CLI::App* export_verb = app.add_subcommand("export", "write files for other tools from the saved states of a run");
   run_flags(export_verb, a);
@@ -450,6 +467,9 @@ int parse_and_call(int argc, char** argv, bool silent) {
   tool::ViewArguments view_arguments;
   view_arguments.quiet = silent;
   CLI::App* view_verb = tool::add_view(app, view_arguments);
+
+  tool::JobArguments job_arguments;
+  CLI::App* job_verb = tool::add_job(app, job_arguments);
 
   CLI::App* info_verb = app.add_subcommand("info", "show what a run folder holds: outcome, audits, times, files");
   info_verb->add_option("run", a.scene, "run folder")->required();
@@ -523,7 +543,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
 
   try {
     app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
+  } catch (const CLI::Success& help) {  // the version, too
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
     tool::expect_known_words(app, std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
@@ -537,6 +557,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
     heed_signals();
     return tool::view(view_arguments, interrupted);
   }
+  if (job_verb->parsed()) return tool::write_job(job_arguments);
   if (scenes_verb->parsed()) {
     std::cout << tool::list_library();
     return 0;

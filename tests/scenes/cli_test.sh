@@ -51,9 +51,10 @@ expect 3 "found 'cube'" check missing_object.yaml
 expect 4 'absent.yaml' check absent.yaml
 expect 4 'plain_file' run good.yaml --out plain_file/out --progress none
 expect 4 '--overwrite' run good.yaml --out good --progress none
+expect 0 '' --version
 expect 2 '' run
 expect 2 "supple: expected a command, found 'rn'; did you mean 'run'? (known: run, render" rn good.yaml
-expect 2 "found 'simulate'; known: run, render, export, view, info, compare, check, explain, query, bench, reference" simulate good.yaml
+expect 2 "found 'simulate'; known: run, render, export, view, job, info, compare, check, explain, query, bench, reference" simulate good.yaml
 expect 2 "supple: expected an option, found '--verson'; did you mean '--version'?" --verson
 expect 2 "supple run: expected an option, found '--thread'; did you mean '--threads'?" run good.yaml --thread 2
 expect 2 "supple run: expected an option, found '-out'; did you mean '--out'?" run -out elsewhere good.yaml
@@ -75,6 +76,23 @@ expect 2 '--time-limit' run good.yaml --out limited --time-limit 0 --progress no
 expect 6 'time limit' run good.yaml --out limited --time-limit 1e-9 --simulate-only --progress none
 expect 0 '' run good.yaml --out limited --resume --simulate-only --progress none
 expect 2 '' query nonsense good.yaml
+expect 2 '--format' job good.yaml
+expect 2 'openjd,slurm,ray' job good.yaml --format lsf
+expect 2 '--chunk' job good.yaml --format ray --chunk 0
+expect 4 'absent.yaml' job absent.yaml --format ray
+mkdir planned && echo '{"points": [{}]}' > planned/sweep.json
+expect 2 'for a sweep' job planned --format slurm --folder elsewhere
+for format in openjd slurm ray; do
+  expect 0 '' job good.yaml --format "$format" --out "a job of $format" --folder 'a run'
+  expect 0 '' job planned --format "$format" --out "a sweep of $format"
+done
+for verb in run render; do
+  expect 3 'expected the scene that the job was written for, with fingerprint 0123456789abcdef' "$verb" good.yaml --out good --fingerprint 0123456789abcdef
+done
+fingerprint=$(grep -o 'fingerprint [0-9a-f]*' 'a job of ray' | cut -d ' ' -f 2)
+expect 0 '' run good.yaml --out 'a run' --no-pictures --resume --fingerprint "$fingerprint" --progress none
+expect 0 '' render good.yaml --out 'a run' --frames 2-9 --fingerprint "$fingerprint" --progress none
+expect 3 'fingerprint' render good.yaml --out 'a run' --set duration=0.3 --fingerprint "$fingerprint" --progress none
 for error in 1e-12 0 0.5 nan; do
   expect 2 "expected a number from 1e-10 to 0.1, found $error" query contact good.yaml --error "$error"
 done

@@ -108,6 +108,41 @@ def races(context, asked):
     return outcome
 
 
+def shards(context, asked):
+    """Processes that draw frames of one run at the same time, in ranges that overlap; some are killed, and one more draws what is missing."""
+    outcome, pick = Outcome(), context.random("shards")
+    runs = small_runs(context, "shards", KILLED[:2])
+    for turn in range(4 * asked):
+        if outcome.reached >= asked:
+            break
+        run = runs[turn % len(runs)]
+        out = context.scratch / "shards" / f"out_{turn}"
+        shutil.copytree(run.reference, out)
+        shutil.rmtree(out / "frames")
+        for made in [*out.glob("*.mp4"), *out.glob("*_sheet.png")]:
+            made.unlink()
+        count = pick.choice([2, 3, 4])
+        size = run.frames // count + 1
+        ranges = [f"{max(1, k * size - pick.choice([0, 2]))}-{(k + 1) * size}" for k in range(count)]
+        processes = [start(run.command(out, "--frames", frames, verb="render")) for frames in ranges]
+        time.sleep(pick.uniform(0.0, run.seconds))
+        for process in processes[: pick.choice([1, count - 1])]:
+            process.kill()
+        where = f"{run.name}, shards {turn}"
+        for process in processes:
+            message = process.communicate(timeout=300)[1].decode("utf-8", "replace")
+            outcome.reached += process.returncode == -signal.SIGKILL
+            if process.returncode not in (0, -signal.SIGKILL):
+                outcome.faults.append(f"{where}: exit {process.returncode}: {message[:200]}")
+        # The sheet may be of the frames that are there.
+        outcome.faults += [f"{where}: {fault}" for fault in broken_files(out, run.files) if "_sheet.png" not in fault]
+        fault = fault_of_exit(run_process(run.command(out, verb="render")), {0})
+        outcome.faults += [f"{where}, drawn again: {text}" for text in ([fault] if fault else run.difference(out))]
+        outcome.faults += [f"{where}: still running: {text}" for text in orphans(out)]
+        shutil.rmtree(out, ignore_errors=True)
+    return outcome
+
+
 def resume(context, asked):
     """Continued from every frame in a fresh process, and once more from that."""
     outcome = Outcome()

@@ -53,6 +53,7 @@ ROWS = [
     Row("kill", "SIGKILL at random moments, then `--resume`: same bits, no temporary file, no process left", 200, "kills", rows_runs.kill),
     Row("signals", "SIGINT, SIGTERM: exit 130, 143, resumed to the same bits", 100, "signals", rows_runs.signals),
     Row("races", "two runs in one folder: one runs, the other is refused with the reason", 50, "races", rows_runs.races),
+    Row("shards", "several processes draw frames of one run, SIGKILL at random moments, drawn again: same bytes, no temporary file, no process left", 100, "kills", rows_runs.shards),
     Row("resume", "resumed twice from every frame, in new processes", 60, "frames", rows_runs.resume),
     Row("threads", "8 scenes by 1, 2, 3, 4, 8, 16 threads: same bits, same files", 48, "runs", rows_runs.threads),
     Row("messages", "golden messages, word for word", 150, "tests", tests(("scenes_tests", "Golden/Message.*:Messages.*")), True),

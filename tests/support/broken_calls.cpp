@@ -46,7 +46,7 @@ bool break_off_calls() {
   action.sa_flags = SA_SIGINFO | SA_NODEFER;
   ::sigaction(SIGSYS, &action, nullptr);
   constexpr std::array kCalls{SYS_open,   SYS_openat, SYS_read,      SYS_write,    SYS_pread64,  SYS_pwrite64,
-                              SYS_fsync,  SYS_rename, SYS_renameat,  SYS_renameat2, SYS_flock,   SYS_close};
+                              SYS_fsync,  SYS_rename, SYS_renameat,  SYS_renameat2, SYS_close};
   std::array<sock_filter, kCalls.size() + 6> filter{};
   std::size_t at = 0;
   filter[at++] = statement(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr));

@@ -2,7 +2,6 @@
 // if a signal came first, and so does every close, after it has closed. Each thread counts for itself.
 #include <dlfcn.h>
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/types.h>
 #include <sys/wait.h>
 
@@ -43,7 +42,14 @@ ssize_t pwrite(int file, const void* data, size_t size, off_t at) {
 }
 int fsync(int file) { return breaks_off() ? -1 : own(&fsync, "fsync")(file); }
 int rename(const char* from, const char* to) noexcept { return breaks_off() ? -1 : own(&rename, "rename")(from, to); }
-int flock(int file, int operation) noexcept { return breaks_off() ? -1 : own(&flock, "flock")(file, operation); }
+int fcntl(int file, int command, ...) {
+  std::va_list list;
+  va_start(list, command);
+  void* const argument = va_arg(list, void*);
+  va_end(list);
+  const bool locks = command == F_OFD_SETLK || command == F_OFD_GETLK;
+  return locks && breaks_off() ? -1 : own(&fcntl, "fcntl")(file, command, argument);
+}
 pid_t waitpid(pid_t process, int* status, int options) {
   return breaks_off() ? -1 : own(&waitpid, "waitpid")(process, status, options);
 }

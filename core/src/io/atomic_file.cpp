@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <random>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -43,7 +44,9 @@ int publish(Descriptor& descriptor, const std::filesystem::path& from, const std
 
 std::filesystem::path temporary_name(const std::filesystem::path& path) {
   static std::atomic<unsigned> counter{0};
-  return path.parent_path() / ('.' + path.filename().string() + '.' + std::to_string(::getpid()) + '.' +
+  // Machines and containers that share a folder may have processes of the same number.
+  static const unsigned token = std::random_device()();
+  return path.parent_path() / ('.' + path.filename().string() + '.' + std::to_string(::getpid()) + '-' + std::to_string(token) + '.' +
                                std::to_string(counter.fetch_add(1)) + ".tmp");
 }
 

@@ -7,6 +7,9 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "output/output_files.h"
@@ -25,6 +28,15 @@ constexpr int kSheetColumns = 4;
 constexpr int kSheetRows = 3;
 constexpr int kSheetImageWidth = 320;
 constexpr int kSheetGap = 4;
+constexpr const char* kFrames = "frames";
+
+/// Names of the files in a folder: of several machines, a folder is up to date when it is opened, while single names may be remembered.
+std::set<std::string> files_in(const fs::path& folder) {
+  std::set<std::string> names;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder, none)) names.insert(entry.path().filename().string());
+  return names;
+}
 
 fs::path sheet_path(const fs::path& folder, const std::string& name) { return folder / (name + "_sheet.png"); }
 
@@ -48,10 +60,13 @@ FrameLooks look_at_frames(const fs::path& folder, const std::string& name, int l
   FrameLooks out;
   using Look = std::pair<std::string, PictureSize>;
   std::map<Look, std::vector<int>> frames;
+  std::vector<std::string> marks(static_cast<std::size_t>(last) + 1);
+  const std::set<std::string> present = files_in(folder / kFrames);
   for (int frame = 1; frame <= last; ++frame) {
     const fs::path path = frame_path(folder, name, frame);
-    if (fs::exists(path)) {
-      frames[{look_in(render::png_fingerprint(path)), picture_size(path)}].push_back(frame);
+    if (present.contains(path.filename().string())) {
+      std::string& mark = marks[static_cast<std::size_t>(frame)] = render::png_fingerprint(path);
+      frames[{look_in(mark), picture_size(path)}].push_back(frame);
     } else {
       out.absent.push_back(frame);
     }
@@ -62,6 +77,12 @@ FrameLooks look_at_frames(const fs::path& folder, const std::string& name, int l
   if (most == frames.end()) return out;
   out.look = most->first.first;
   out.most = most->second;
+  Hasher shown;
+  for (const int frame : out.most) {
+    shown.add(static_cast<std::uint64_t>(frame));
+    shown.add(std::string_view(marks[static_cast<std::size_t>(frame)]));
+  }
+  out.sheet = picture_fingerprint(out.look, shown.value());
   for (const auto& [look, with] : frames) {
     if (look == most->first) continue;
     out.others.insert(out.others.end(), with.begin(), with.end());
@@ -96,9 +117,19 @@ void remove_stale_sheet(const fs::path& folder, const std::string& name, const s
   if (!mark.empty() && look_in(mark) != look) fs::remove(sheet_path(folder, name), ignored);
 }
 
+bool all_have_look(const fs::path& folder, const std::string& name, const std::string& look, int last, int from) {
+  const std::set<std::string> present = files_in(folder / kFrames);
+  for (int k = 0; k < last; ++k) {
+    const fs::path path = frame_path(folder, name, (from + k) % last + 1);
+    if (!present.contains(path.filename().string()) || look_in(render::png_fingerprint(path)) != look) return false;
+  }
+  return true;
+}
+
 fs::path write_contact_sheet(const fs::path& folder, const std::string& name, const FrameLooks& looks) {
   const std::vector<int>& present = looks.most;
   if (present.empty()) return {};
+  if (render::png_fingerprint(sheet_path(folder, name)) == looks.sheet) return sheet_path(folder, name);
   const int wanted = std::min<int>(kSheetColumns * kSheetRows, static_cast<int>(present.size()));
   std::vector<render::Image> images;
   for (int k = 0; k < wanted; ++k) {
@@ -107,7 +138,7 @@ fs::path write_contact_sheet(const fs::path& folder, const std::string& name, co
     const render::Image frame = render::read_png(frame_path(folder, name, present[index]));
     images.push_back(render::downscale(frame, std::min(kSheetImageWidth, frame.width)));
   }
-  render::write_png(sheet_path(folder, name), render::contact_sheet(images, kSheetColumns, kSheetGap), looks.look);
+  render::write_png(sheet_path(folder, name), render::contact_sheet(images, kSheetColumns, kSheetGap), looks.sheet);
   return sheet_path(folder, name);
 }
 

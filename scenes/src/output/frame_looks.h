@@ -25,6 +25,7 @@ struct FrameLooks {
   std::vector<int> most;     ///< with this look
   std::vector<int> others;   ///< with another one
   std::vector<int> absent;   ///< without a picture
+  std::string sheet;         ///< mark of a contact sheet of `most`: it begins with the look
   bool sizes_differ = false;
 };
 [[nodiscard]] FrameLooks look_at_frames(const std::filesystem::path& folder, const std::string& name, int last);
@@ -40,7 +41,11 @@ bool remove_stale_film(const std::filesystem::path& folder, const std::string& n
 /// Removes NAME_sheet.png if a run made it with another look.
 void remove_stale_sheet(const std::filesystem::path& folder, const std::string& name, const std::string& look);
 
-/// NAME_sheet.png: twelve frames spread over those with the most frequent look, 3 rows of 4. Empty when there are none.
+/// Whether frames 1 .. last all have a PNG with this look. Frames after `from` are looked at first, those up to it at last.
+[[nodiscard]] bool all_have_look(const std::filesystem::path& folder, const std::string& name, const std::string& look, int last, int from);
+
+/// NAME_sheet.png: twelve frames spread over those with the most frequent look, 3 rows of 4. Empty when there are none. A sheet of the same
+/// pictures stays.
 std::filesystem::path write_contact_sheet(const std::filesystem::path& folder, const std::string& name, const FrameLooks& looks);
 
 }  // namespace supple::scenes

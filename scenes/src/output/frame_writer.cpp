@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "file/scene_keys.h"
+#include "file/scene_places.h"
 #include "output/animation_parts.h"
 #include "output/frame_looks.h"
 #include "output/frame_tables.h"
@@ -152,6 +154,17 @@ bool FrameWriter::pictures_are_current(int frame, std::uint64_t state_hash) cons
     }
   }
   return true;
+}
+
+PictureLook FrameWriter::look_of(const Scene& scene, const RunOptions& options) {
+  const FileAccess files = files_of(scene);
+  FileHashes hashes(files);
+  return {.program = program_identity(), .context = options.context, .keys = text_of(picture_keys(scene, hashes))};
+}
+
+bool FrameWriter::pictures_are_there(int last, int from) const {
+  return std::all_of(image_names_.begin(), image_names_.end(),
+                     [&](const std::string& name) { return all_have_look(options_.folder, name, look_, last, from); });
 }
 
 bool FrameWriter::writes_frames() const {

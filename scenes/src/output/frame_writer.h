@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "output/folder_lock.h"
 #include "output/picture.h"
 #include "output/scene_grids.h"
 #include "simulation/scene_samples.h"
@@ -42,6 +43,11 @@ class FrameWriter {
   void write(Simulation& simulation, Reporter& report, double done);
   /// Writes films, contact sheets and lists over all existing frames 1 .. last. Returns the film, if there is one.
   std::filesystem::path finish(Simulation& simulation, Reporter& report, int last);
+
+  /// Whether frames 1 .. last all have a picture in the look of this writer. @param from  frames after it are looked at first
+  [[nodiscard]] bool pictures_are_there(int last, int from) const;
+  /// What pictures depend on besides the state.
+  [[nodiscard]] static PictureLook look_of(const Scene& scene, const RunOptions& options);
 
   /// Whether frames have separate files or share one.
   [[nodiscard]] bool writes_frames() const;

@@ -83,6 +83,7 @@ void add_missed_accuracy(const Scene& scene, const StageErrors& errors, std::vec
 
 OutputRequest outputs_of(const Scene& scene, const RunOptions& options) {
   OutputRequest outputs = requested_outputs(scene);
+  if (options.no_pictures) outputs.images = outputs.film = false;
   if (options.simulate_only) outputs.images = outputs.film = outputs.meshes = outputs.grids = outputs.samples = false;
   return outputs;
 }
@@ -293,7 +294,7 @@ bool resume(const Resuming& run) {
 
 /// Files over all frames, and what was drawn.
 void finish(FrameWriter& writer, Simulation& simulation, Reporter& report, RunResult& result) {
-  result.film = writer.finish(simulation, report, result.frames);
+  if (!result.film_is_left) result.film = writer.finish(simulation, report, result.frames);
   result.pictures_drawn += writer.pictures_drawn();
   result.pictures.add(writer.picture_times(), 1.0);
   writer.add_warnings(result.warnings);
@@ -316,8 +317,14 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
   }
   const int last = saved->last;
   io::make_writable_folder(options.folder);
-  const FolderLock lock(options.folder);
-  remove_temporaries(options.folder, name);
+  std::optional<FolderLock> lock;
+  std::optional<SharedFolder> share;
+  if (pictures_only) {
+    share.emplace(options.folder, name, FrameWriter::look_of(scene, options), options.interrupt);
+  } else {
+    lock.emplace(options.folder);
+    remove_temporaries(options.folder, name);
+  }
 
   std::optional<Simulation> simulation;
   return guarded(scene, options, report_name, simulation, [&](RunResult& result) {
@@ -355,6 +362,11 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
     }
     show_last(*simulation, options, last);
     result.frames = last;
+    if (share) {
+      const bool complete = writer.pictures_are_there(last, frames.empty() ? 0 : frames.back());
+      result.film_is_left = !complete && share->leaves_to_others();
+      if (!result.film_is_left) share->take_turn();
+    }
     finish(writer, *simulation, report, result);
   });
 }

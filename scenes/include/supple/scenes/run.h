@@ -38,6 +38,7 @@ struct RunOptions {
   bool simulate_only = false;                   ///< no images, meshes, grids, samples or film
   bool skip = true;                             ///< see SimulationOptions::skip
   bool profile = false;
+  bool no_pictures = false;                     ///< no images and no film, which `render_run` makes of the saved states
   implicit::DelaunayMesher delaunay{};          ///< see SimulationOptions::delaunay
   std::string context = "auto";                 ///< auto, osmesa or egl
   int frames_at_once = 0;                       ///< frames in work at the same time when pictures are drawn, including the simulated one; 0: one per thread, as memory allows
@@ -74,6 +75,7 @@ struct RunResult {
   int pictures_drawn = 0;
   int frames_at_once = 1;   ///< frames that were in work at the same time
   int pictures_kept = 0;    ///< pictures of `render_run` that existed already and show this scene and state
+  bool film_is_left = false; ///< frames are absent, and other processes that still draw make film and sheet
   std::filesystem::path report; ///< result.json, render.json or export.json
   std::filesystem::path film;   ///< empty: none
   std::vector<std::string> warnings;
@@ -94,6 +96,8 @@ void check_pictures(const Scene& scene);
 
 /// Draws the frames of a finished or interrupted run again from its saved states, with the scene's camera and looks.
 /// Existing pictures of the same scene and state are kept, unless options.overwrite. Writes render.json.
+/// Several processes may do this in one folder at the same time, each with its own frames, all in one look. One that completes the frames makes
+/// film and sheet; the last one does, or says which frames have no picture, where none completes them.
 [[nodiscard]] RunResult render_run(const Scene& scene, const RunOptions& options);
 
 /// Writes NAME_sheet.png, one per camera, from the frames of a run: twelve frames spread over all, 4 per row.

@@ -45,7 +45,7 @@ class AtomicFile {
 /// Largest file of points, meshes or pictures that scenes read [byte].
 inline constexpr std::size_t kLargestInput = std::size_t{1} << 29;
 
-/// A hidden name beside `path` that this process has not used before: .NAME.PROCESS.COUNT.tmp
+/// A hidden name beside `path` that no process has used before: .NAME.PROCESS-RANDOM.COUNT.tmp
 [[nodiscard]] std::filesystem::path temporary_name(const std::filesystem::path& path);
 
 /// Renames a file that another program wrote to its final name, after fsync. @throws Error{Io}; it keeps its first name then.
