@@ -25,6 +25,7 @@
 #include "library.h"
 #include "print.h"
 #include "progress_bar.h"
+#include "sweep.h"
 #include "templates.h"
 #include "usage.h"
 #include "view.h"
@@ -451,6 +452,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
   view_arguments.quiet = silent;
   CLI::App* view_verb = tool::add_view(app, view_arguments);
 
+  tool::SweepArguments sweep_arguments;
+  sweep_arguments.quiet = silent;
+  CLI::App* sweep_verb = tool::add_sweep(app, sweep_arguments);
+
   CLI::App* info_verb = app.add_subcommand("info", "show what a run folder holds: outcome, audits, times, files");
   info_verb->add_option("run", a.scene, "run folder")->required();
   info_verb->footer("Example: supple info out/two_balls");
@@ -536,6 +541,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
   if (view_verb->parsed()) {
     heed_signals();
     return tool::view(view_arguments, interrupted);
+  }
+  if (sweep_verb->parsed()) {
+    heed_signals();
+    return tool::sweep(sweep_arguments, simulation_options(0).delaunay, interrupted);
   }
   if (scenes_verb->parsed()) {
     std::cout << tool::list_library();
