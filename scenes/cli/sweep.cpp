@@ -1,8 +1,13 @@
 #include "sweep.h"
 
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <system_error>
 
 #include "library.h"
 #include "print.h"
@@ -23,7 +28,8 @@ constexpr const char* kFooter =
     "points are rows with their outcome. Points are independent: other machines may run them with --point, and --collect joins the rows.\n\n"
     "Examples: supple sweep two_balls --set objects.left.contact.modulus=1e3:1e6:log9 --set contact.friction=0:0.5:6 --out out/sweep\n"
     "          supple sweep out/sweep --point 3\n"
-    "          supple sweep out/sweep --collect";
+    "          supple sweep out/sweep --collect\n"
+    "          supple sweep out/sweep --plot left-right.peak_force_n --over objects.left.contact.modulus";
 
 [[noreturn]] void refuse(std::string place, std::string expected, std::string found, std::string hint) {
   throw Error(ErrorKind::Usage, Fault{.place = std::move(place), .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = std::move(hint)});
@@ -84,6 +90,24 @@ int run_all(const fs::path& folder, const SweepArguments& a, const std::atomic<i
   return 0;
 }
 
+/// Leaves the plot to matplotlib, by the Python package. @throws Error{Io} where Python cannot be started
+int plot(const fs::path& folder, const SweepArguments& a) {
+  const char* named = std::getenv("SUPPLE_PYTHON");
+  std::vector<std::string> words{named == nullptr || *named == '\0' ? "python3" : named, "-m", "supple", "plot", folder.string(), a.plot};
+  for (const std::string& key : a.over) words.insert(words.end(), {"--over", key});
+  if (!a.svg.empty()) words.insert(words.end(), {"--svg", a.svg});
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  std::cout.flush();
+  execvp(argv[0], argv.data());
+  throw Error(ErrorKind::Io, Fault{.place = words[0],
+                                   .key = {},
+                                   .expected = "cannot be started: " + std::generic_category().message(errno),
+                                   .found = {},
+                                   .hint = "plots need Python with the package supple and matplotlib; SUPPLE_PYTHON names the interpreter"});
+}
+
 }  // namespace
 
 CLI::App* add_sweep(CLI::App& app, SweepArguments& a) {
@@ -104,6 +128,9 @@ CLI::App* add_sweep(CLI::App& app, SweepArguments& a) {
   verb->add_flag("--plan-only", a.plan_only, "write the plan and run nothing");
   CLI::Option* point = verb->add_option("--point", a.point, "of a folder: run this point only; one that is finished is left as it is")->check(CLI::Range(1, static_cast<int>(scenes::kMostSweepPoints)));
   verb->add_flag("--collect", a.collect, "of a folder: make the table from the rows that are there")->excludes(point);
+  CLI::Option* plot = verb->add_option("--plot", a.plot, "of a folder: draw a column of the table as SVG (with matplotlib, by the Python package)");
+  verb->add_option("--over", a.over, "with --plot: key of an axis; twice for a map of colours (default: the first one or two keys)")->needs(plot)->take_all();
+  verb->add_option("--svg", a.svg, "with --plot: file to write (default: COLUMN.svg in the folder)")->needs(plot);
   verb->add_flag("--overwrite", a.overwrite, "replace the plan of an earlier sweep in the folder");
   verb->add_option("--progress", a.progress, "auto, bar, plain or none")->check(CLI::IsMember({"auto", "bar", "plain", "none"}));
   verb->add_flag("--quiet", a.quiet, "print warnings and errors only");
@@ -115,6 +142,7 @@ int sweep(const SweepArguments& a, const implicit::DelaunayMesher& delaunay, con
   const fs::path folder = planned(a);
   if (a.plan_only) return 0;
   if (a.point > 0) return run_one(folder, a, delaunay, interrupt);
+  if (!a.plot.empty()) return plot(folder, a);
   if (!a.collect) return run_all(folder, a, interrupt);
   const fs::path table = scenes::collect_sweep(folder);
   if (!a.quiet) print(std::cout, "table:  %s\n", table.c_str());

@@ -16,7 +16,8 @@ struct SweepArguments {
   std::string what;               ///< scene, or folder of a sweep
   std::vector<std::string> set;
   std::vector<std::filesystem::path> allowed;
-  std::string out, sample, measure;
+  std::string out, sample, measure, plot, svg;
+  std::vector<std::string> over;
   std::string progress = "auto";
   std::uint64_t seed = 1;
   int point = 0;                  ///< 0: all

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "output/output_files.h"
+#include "output/run_origin.h"
 #include "output/saved_frames.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
@@ -48,7 +49,7 @@ FrameLooks look_at_frames(const fs::path& folder, const std::string& name, int l
   FrameLooks out;
   using Look = std::pair<std::string, PictureSize>;
   std::map<Look, std::vector<int>> frames;
-  for (int frame = 1; frame <= last; ++frame) {
+  for (int frame = first_frame_of(folder); frame <= last; ++frame) {
     const fs::path path = frame_path(folder, name, frame);
     if (fs::exists(path)) {
       frames[{look_in(render::png_fingerprint(path)), picture_size(path)}].push_back(frame);

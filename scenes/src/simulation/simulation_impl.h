@@ -78,6 +78,7 @@ struct Simulation::Impl {
   void advance_divided(double begin, double h, int halvings);
   [[nodiscard]] bool creates_energy(const Energies& before, const core::Ledger& ledger, const Energies& now) const;
   void book_contacts();
+  void book_implicit(double end, double h);
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out);
   core::ImplicitContact implicit_contact();
   void commit_friction();

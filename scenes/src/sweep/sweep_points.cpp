@@ -94,6 +94,27 @@ std::string fingerprint_of(const Error& error) {
   return to_hex(hasher.value());
 }
 
+/// A point's scene, and what its row is known by.
+struct Prepared {
+  std::optional<Scene> scene;  ///< none: it has faults
+  std::string faults;
+  std::string fingerprint;
+};
+
+/// @throws Error as read_scene, but not Error{Scene}
+Prepared prepare(const SweepPlan& plan, const SweepPoint& point) {
+  Prepared out;
+  try {
+    out.scene = read_scene(plan.scene, point.set, plan.allowed);
+    out.fingerprint = fingerprint_of(plan, *out.scene);
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::Scene) throw;
+    out.faults = error.what();
+    out.fingerprint = fingerprint_of(error);
+  }
+  return out;
+}
+
 bool is_kept(const ordered_json& row, const std::string& fingerprint, SweepRow& out) {
   if (row.is_null() || row["fingerprint"] != fingerprint) return false;
   const SweepRow found = row_of(out.number, row);
@@ -128,9 +149,13 @@ std::string cell(const ordered_json& value) {
   return cell(value.is_string() ? value.get<std::string>() : value.dump());
 }
 
-/// The value of "key=value": a quantity as the number that means the same without a unit.
+/// The value of "key=value": a quantity as the number that means the same without a unit, a text without its quotes.
 std::string plain_value(const std::string& setting) {
   const std::string text = setting.substr(setting.find('=') + 1);
+  if (text.starts_with('"')) {
+    const ordered_json quoted = ordered_json::parse(text, nullptr, false);
+    return quoted.is_string() ? quoted.get<std::string>() : text;
+  }
   if (text.find(' ') == std::string::npos) return text;
   const auto quantity = read_any_quantity(text);
   if (!quantity) return text;
@@ -177,6 +202,9 @@ class PointRunner {
 
   SweepRow run_one(const SweepPoint& point) {
     const fs::path place = folder_ / point.folder;
+    SweepRow kept{.number = point.number, .outcome = {}, .reason = {}};
+    const ordered_json before = read_row(place);
+    if (!before.is_null() && is_kept(before, prepare(plan_, point).fingerprint, kept)) return kept;
     std::vector<std::string> words = options_.command;
     words.insert(words.end(), {folder_.string(), "--point", std::to_string(point.number)});
     io::ProgramEnd end;
@@ -221,24 +249,19 @@ SweepRow run_point(const fs::path& folder, int number, const PointOptions& optio
   io::make_writable_folder(place);
   const ordered_json before = read_row(place);
   SweepRow row{.number = number, .outcome = kUnfinished, .reason = {}};
-  std::optional<Scene> scene;
-  try {
-    scene = read_scene(plan.scene, point.set, plan.allowed);
-  } catch (const Error& error) {
-    if (error.kind() != ErrorKind::Scene) throw;
-    const PointFiles files{place, point, fingerprint_of(error)};
-    if (is_kept(before, files.fingerprint, row)) return row;
+  const Prepared prepared = prepare(plan, point);
+  const PointFiles files{place, point, prepared.fingerprint};
+  if (is_kept(before, files.fingerprint, row)) return row;
+  if (!prepared.scene) {
     row.outcome = "invalid";
-    row.reason = error.what();
-    row.exit_code = static_cast<int>(error.kind());
+    row.reason = prepared.faults;
+    row.exit_code = static_cast<int>(ErrorKind::Scene);
     write_row(files, row, ordered_json::object());
     return row;
   }
-  const PointFiles files{place, point, fingerprint_of(plan, *scene)};
-  if (is_kept(before, files.fingerprint, row)) return row;
   const bool resume = !before.is_null() && before["fingerprint"] == files.fingerprint;
   write_row(files, row, ordered_json::object());
-  const RunResult result = run_scene(*scene, run_options_of(plan, options, place, resume));
+  const RunResult result = run_scene(*prepared.scene, run_options_of(plan, options, place, resume));
   row.outcome = result.outcome;
   row.reason = result.reason;
   row.exit_code = result.exit_code;
