@@ -67,6 +67,20 @@ def study(folder, modulus="1e4:1e6:log20", speed="0.1:1:log10"):
     return supple.Table(columns, table.parameters)
 
 
+def draw(table, images):
+    """The runs with the closed forms for small depth, dashed."""
+    figure = table.plot("contact_time_s", MODULUS)
+    modulus = np.geomspace(1e4, 1e6, 60)
+    for v in np.unique(table[SPEED]):
+        figure.axes[0].plot(modulus, contact_time(SLOPE * modulus, np.full(60, v), DISSIPATION), "k--", linewidth=0.5)
+    figure.savefig(images / "bounce_contact_time.svg", metadata={"Date": None})
+    figure = table.plot("restitution", SPEED)
+    v = np.geomspace(0.1, 1, 60)
+    figure.axes[0].plot(v, restitution(v, DISSIPATION), "k--", linewidth=0.5)
+    figure.axes[0].set_xscale("log")
+    figure.savefig(images / "bounce_restitution.svg", metadata={"Date": None})
+
+
 def main():
     if len(sys.argv) not in (2, 3):
         print(__doc__, file=sys.stderr)
@@ -80,9 +94,7 @@ def main():
         worst = [np.max(np.abs(table[name][rows]), initial=0) for name in ("restitution_error", "time_error", "time_error_small_depth")]
         print(f"| {low:g} to {high:g} | {np.sum(rows)} | " + " | ".join(f"{x:.1e}" for x in worst) + " |")
     if len(sys.argv) == 3:
-        images = pathlib.Path(sys.argv[2])
-        table.plot("restitution", SPEED, images / "bounce_restitution.svg")
-        table.plot("contact_time_s", [MODULUS, SPEED], images / "bounce_contact_time.svg")
+        draw(table, pathlib.Path(sys.argv[2]))
     return 0
 
 

@@ -345,9 +345,9 @@ kill -9 "$run"
 wait "$run" 2> /dev/null
 expect 0 '' sweep killed --progress none
 cmp -s sweep/table.csv killed/table.csv || fault 'a sweep that was killed ends with another table'
-expect 0 '' sweep diverges.yaml --set 'objects.chain.interactions[0].stretch=[1e6, 1e-3]' --out sweep_fails --progress none
-grep -q '^1,1e6,diverged,.*diverged at step' sweep_fails/table.csv || fault "no row of a failed point: $(cat sweep_fails/table.csv)"
-grep -q '^2,1e-3,done,' sweep_fails/table.csv || fault "a failed point ends a sweep: $(cat sweep_fails/table.csv)"
+expect 0 '' sweep diverges.yaml --set 'objects.chain.interactions[0]=[{law: bond_frame, stretch: 1e6, rotation: 10}, {law: bond_frame, stretch: 1e-3, rotation: 1e-9}]' --out sweep_fails --progress none
+grep -q '^1,.*,diverged,.*diverged at step' sweep_fails/table.csv || fault "no row of a failed point: $(cat sweep_fails/table.csv)"
+grep -q '^2,.*,done,' sweep_fails/table.csv || fault "a failed point ends a sweep: $(cat sweep_fails/table.csv)"
 
 # A variation of a run.
 expect 0 '' run good.yaml --from-frame 2 --from good --set "$mass=3" --out varied --simulate-only --progress none

@@ -39,6 +39,10 @@ def _keys(table, over):
     return keys
 
 
+def _short(value):
+    return value if isinstance(value, str) else f"{value:.4g}"
+
+
 def _lines(axes, table, column, key):
     x, y = _numbers(table, key, "over"), _numbers(table, column, "column")
     others = [k for k in table.parameters if k != key]
@@ -46,7 +50,7 @@ def _lines(axes, table, column, key):
     for group in groups:
         rows = np.logical_and.reduce([table[k] == v for k, v in zip(others, group)]) if others else np.ones(len(x), bool)
         order = np.argsort(x[rows], kind="stable")
-        axes.plot(x[rows][order], y[rows][order], ".-", label=", ".join(f"{k} = {v}" for k, v in zip(others, group)), linewidth=1, markersize=4)
+        axes.plot(x[rows][order], y[rows][order], ".-", label=", ".join(f"{k} = {_short(v)}" for k, v in zip(others, group)), linewidth=1, markersize=4)
     if others and len(groups) <= _MANY:
         axes.legend(fontsize="x-small")
     axes.set(xlabel=key, ylabel=column, xscale="log" if _is_far(x) else "linear", yscale="log" if _is_far(y) else "linear")

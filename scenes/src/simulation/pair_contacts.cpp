@@ -23,12 +23,12 @@ std::uint32_t object_of(const StageContext& context, std::uint32_t body) {
 }
 
 /// By objects, ascending; pairs of one object and those without load are left out.
-std::vector<PairNow> pairs_now(const StageContext& context, const Frame& frame) {
+std::vector<PairNow> pairs_now(const StageContext& context, const Frame& frame, std::span<const double> depths) {
   std::vector<PairNow> all;
   const std::size_t count = std::min(frame.surface.summary.size(), frame.traction_force.size());
   for (std::size_t k = 0; k < count; ++k) {
     const auto& s = frame.surface.summary[k];
-    PairNow one{.objects = {object_of(context, s.bodies.a), object_of(context, s.bodies.b)}, .force = frame.traction_force[k], .depth = s.largest_overlap};
+    PairNow one{.objects = {object_of(context, s.bodies.a), object_of(context, s.bodies.b)}, .force = frame.traction_force[k], .depth = k < depths.size() ? depths[k] : s.largest_overlap};
     if (one.objects.a == one.objects.b || !(one.force.squaredNorm() > 0.0)) continue;
     if (one.objects.b < one.objects.a) {
       std::swap(one.objects.a, one.objects.b);
@@ -173,9 +173,38 @@ void book(const Booking& booking, const PairNow& now, PairContact& pair) {
 
 }  // namespace
 
+void EndDepths::predict(const core::ParticleState& pose, const core::ContactPoints& points) {
+  peaks_.assign(points.pair.size(), {});
+  for (std::size_t k = 0; k < points.pair.size(); ++k) {
+    const core::ContactPoints::Pair& pair = points.pair[k];
+    if (pair.begin == pair.end) continue;
+    const auto first = points.pressure.begin() + pair.begin, last = points.pressure.begin() + pair.end;
+    const auto q = static_cast<std::size_t>(std::max_element(first, last) - points.pressure.begin());
+    peaks_[k].normal = points.normal[q];
+    for (std::uint32_t e = points.offset[q]; e < points.offset[q + 1]; ++e) {
+      const std::uint32_t p = points.particle[e];
+      peaks_[k].movers.push_back({p, points.share[e], pose.position[p]});
+    }
+  }
+}
+
+std::vector<double> EndDepths::at_end(const core::ParticleState& particles, std::span<const collision::ContactSurface::Summary> pairs) const {
+  std::vector<double> depths;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    Vec3 approach = Vec3::Zero();
+    if (k < peaks_.size()) {
+      for (const Mover& m : peaks_[k].movers) approach += m.share * (particles.position[m.particle] - m.predicted);
+      depths.push_back(std::max(0.0, pairs[k].largest_overlap + approach.dot(peaks_[k].normal)));
+    } else {
+      depths.push_back(pairs[k].largest_overlap);
+    }
+  }
+  return depths;
+}
+
 void book_pair_contacts(const StageContext& context, const Frame& frame, const BookedStep& step, State& state) {
   std::vector<PairContact>& all = state.record.pair_contacts;
-  const std::vector<PairNow> now = pairs_now(context, frame);
+  const std::vector<PairNow> now = pairs_now(context, frame, step.depths);
   if (now.empty() && all.empty()) return;
   const Booking booking{context, frame, step, state.particles};
   const std::size_t known = all.size();

@@ -191,7 +191,7 @@ void Simulation::Impl::check_divergence() {
 /// Implicit steps have booked their contacts themselves; where all sleeps nothing changes.
 void Simulation::Impl::book_contacts() {
   const bool implicit = core::is_implicit(integrator.settings.method);
-  if (awake.empty() || !implicit) book_pair_contacts(context(), frame, {.end = time(), .size = dt(), .mean_forces = implicit}, state);
+  if (awake.empty() || !implicit) book_pair_contacts(context(), frame, {.end = time(), .size = dt(), .mean_forces = implicit, .depths = {}}, state);
   if (awake.empty() || implicit) return;
   book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
   if (state.substep == (1 << state.halvings) && contact_on()) friction.look(context(), frame);
@@ -207,10 +207,18 @@ void Simulation::Impl::advance_particles(double begin, double h) {
     evaluate_forces(at_state, at, out);
   };
   core::ImplicitContact contact = implicit_contact();
+  EndDepths depths;
+  if (contact.find) {
+    contact.find = [&depths, find = std::move(contact.find)](const core::ParticleState& pose, double at, core::ContactPoints& out) {
+      find(pose, at, out);
+      depths.predict(pose, out);
+    };
+  }
   const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr}, begin, h,
                                                 {state.particles, state.kick, state.ledger}, {executor, workspace, integrator_workspace});
   book_work(report);
   if (!core::is_implicit(method)) return;
+  end_depths = depths.at_end(state.particles, frame.surface.summary);
   frame.pair_power.resize(contact.load.size());
   frame.traction_force.resize(contact.load.size());
   frame.friction_speed.resize(contact.load.size());
@@ -262,7 +270,7 @@ void Simulation::Impl::advance_divided(double begin, double h, int halvings) {
 void Simulation::Impl::book_implicit(double end, double h) {
   friction.look(context(), frame);
   book_pair_work(frame.surface.summary, frame.pair_power, h, state.record);
-  book_pair_contacts(context(), frame, {.end = end, .size = h, .mean_forces = true}, state);
+  book_pair_contacts(context(), frame, {.end = end, .size = h, .mean_forces = true, .depths = end_depths}, state);
 }
 
 /// Substeps stay on the grid of the frame.

@@ -48,6 +48,7 @@ struct Simulation::Impl {
   IntegratorPlan integrator;
   core::IntegratorWorkspace integrator_workspace;
   core::StepReport work;  ///< of all steps of this object
+  std::vector<double> end_depths;  ///< of an implicit step, by pair of `frame.surface` [m]
 
   // Results at the current state; in a frame of their own, so that reading them cannot disturb stepping.
   Frame pulled;

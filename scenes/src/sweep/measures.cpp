@@ -34,17 +34,20 @@ void measure_fields(FieldArchive& archive, Measure& m) {
   archive("column", m.column, {}, "of the table");
   archive("across", m.across, {}, "rows of one frame");
   archive("reduce", m.reduce, {}, "frames of the run");
+  const bool frames = archive.given("frames");
+  if (frames || archive.given("take")) m.kind = frames ? Measure::Kind::Frames : Measure::Kind::Pair;
+  const auto table = [&](FrameTableName name) { return frames && m.frames == name; };
   const auto need = [&archive](bool holds, const char* key, const char* expected, const char* found, const char* hint) { archive.check(holds, key, expected, found, hint); };
-  const int ways = (archive.given("result") ? 1 : 0) + (archive.given("take") ? 1 : 0) + (archive.given("frames") ? 1 : 0);
+  const int ways = (archive.given("result") ? 1 : 0) + (archive.given("take") ? 1 : 0) + (frames ? 1 : 0);
   need(ways == 1, "", "expected one of result, take (with pair) and frames", ways == 0 ? "none" : "several",
        "for example {pair: [ball, floor], take: peak_force}, {frames: energies, column: total_j, reduce: max} or {result: audits.energy_error}");
   need(!archive.given("pair") || m.pair.size() == 2, "pair", "expected two names", "another number", "");
   need(!archive.given("take") || archive.given("pair"), "take", "expected a pair to take it of", "none", "add pair: [A, B]");
-  need(!archive.given("pair") || archive.given("take") || m.frames == FrameTableName::Contacts, "pair", "expected it with take, or with frames: contacts", "neither", "");
-  need(!archive.given("frames") || (archive.given("column") && archive.given("reduce")), "frames", "expected column and reduce with it", "neither, or one", "reduce is one of min, max, mean, final, peak_time, integral");
-  need(archive.given("frames") || !(archive.given("column") || archive.given("reduce") || archive.given("across") || archive.given("of")), "",
+  need(!archive.given("pair") || archive.given("take") || table(FrameTableName::Contacts), "pair", "expected it with take, or with frames: contacts", "neither", "");
+  need(!frames || (archive.given("column") && archive.given("reduce")), "frames", "expected column and reduce with it", "neither, or one", "reduce is one of min, max, mean, final, peak_time, integral");
+  need(frames || !(archive.given("column") || archive.given("reduce") || archive.given("across") || archive.given("of")), "",
        "expected column, reduce, across and of with frames only", "one of them without", "");
-  need(!archive.given("of") || m.frames == FrameTableName::Objects || m.frames == FrameTableName::Particles, "of", "expected it with frames: objects or frames: particles", "another table",
+  need(!archive.given("of") || table(FrameTableName::Objects) || table(FrameTableName::Particles), "of", "expected it with frames: objects or frames: particles", "another table",
        "rows of contacts are chosen by pair");
 }
 
@@ -147,9 +150,9 @@ void check_members(MeasureFile& file, const Simulation& simulation, const Measur
 }
 
 void check_column(MeasureFile& file, Simulation& simulation, const Measure& measure) {
-  const std::vector<std::string> names = frame_columns(*measure.frames, simulation).name;
+  const std::vector<std::string> names = frame_columns(measure.frames, simulation).name;
   if (std::find(names.begin(), names.end(), measure.column) == names.end()) {
-    file.fault(measure, "column", "expected a column of " + std::string(name_of(*measure.frames)), '\'' + shown(measure.column) + '\'', hint_of(measure.column, names));
+    file.fault(measure, "column", "expected a column of " + std::string(name_of(measure.frames)), '\'' + shown(measure.column) + '\'', hint_of(measure.column, names));
   }
 }
 
@@ -241,7 +244,7 @@ class FinishedRun {
   /// Values of a column at all frames, one each.
   std::vector<double> series(const Measure& measure) {
     std::vector<double> values;
-    const std::vector<FrameColumns>& frames = table(*measure.frames);
+    const std::vector<FrameColumns>& frames = table(measure.frames);
     for (const FrameColumns& frame : frames) values.push_back(value_at(frame, measure));
     return values;
   }
@@ -272,7 +275,8 @@ class FinishedRun {
 
   static double value_at(const FrameColumns& frame, const Measure& measure) {
     const auto column = static_cast<std::size_t>(std::find(frame.name.begin(), frame.name.end(), measure.column) - frame.name.begin());
-    const AcrossName across = measure.across.value_or(measure.frames == FrameTableName::Contacts ? AcrossName::Sum : AcrossName::Mean);
+    const AcrossName usual = measure.frames == FrameTableName::Contacts ? AcrossName::Sum : AcrossName::Mean;
+    const AcrossName across = measure.across == AcrossName::Auto ? usual : measure.across;
     double sum = 0.0, least = kNoValue, most = kNoValue;
     int rows = 0;
     for (std::size_t i = 0; i < frame.members.size(); ++i) {
@@ -287,7 +291,8 @@ class FinishedRun {
       case AcrossName::Sum: return sum;
       case AcrossName::Mean: return rows > 0 ? sum / rows : kNoValue;
       case AcrossName::Min: return least;
-      case AcrossName::Max: break;
+      case AcrossName::Max:
+      case AcrossName::Auto: break;
     }
     return most;
   }
@@ -325,18 +330,18 @@ double reduced(const std::vector<double>& values, ReduceName reduce, double fram
 }
 
 ordered_json value_of(const Measure& measure, FinishedRun& run) {
-  if (!measure.result.empty()) {
+  if (measure.kind == Measure::Kind::Result) {
     const Found found = find_value(run.report, measure.result);
     return found.value == nullptr || found.value->is_structured() ? ordered_json(nullptr) : *found.value;
   }
-  if (measure.frames) {
+  if (measure.kind == Measure::Kind::Frames) {
     const double value = reduced(run.series(measure), measure.reduce, run.frame_rate());
     return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
   }
   if (measure.take == TakeName::DepthAtRest) return run.depth_at_rest(measure.pair);
   const ordered_json* pair = pair_of(run.report, measure.pair);
-  if (pair == nullptr) return untouched(*measure.take);
-  const ordered_json& value = pair->at(key_of(*measure.take));
+  if (pair == nullptr) return untouched(measure.take);
+  const ordered_json& value = pair->at(key_of(measure.take));
   return value.is_array() ? ordered_json(Vec3(value[0], value[1], value[2]).norm()) : value;
 }
 
@@ -372,8 +377,8 @@ void check_measures(const SweepPlan& plan) {
   const ordered_json report = report_of(scene, start, &simulation, {});
   for (const Measure& measure : file.measures) {
     check_members(file, simulation, measure);
-    if (measure.frames) check_column(file, simulation, measure);
-    if (!measure.result.empty()) check_path(file, report, measure);
+    if (measure.kind == Measure::Kind::Frames) check_column(file, simulation, measure);
+    if (measure.kind == Measure::Kind::Result) check_path(file, report, measure);
   }
   file.faults.raise();
 }

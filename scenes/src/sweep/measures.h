@@ -9,7 +9,6 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +22,7 @@ namespace supple::scenes {
 enum class TakeName : std::uint8_t { PeakForce, PeakTime, Impulse, ContactTime, FirstTouch, FirstContactTime, ApproachSpeed, ReboundSpeed, Restitution, LargestDepth, DepthAtRest, Touches };
 enum class FrameTableName : std::uint8_t { Energies, Objects, Particles, Contacts };
 enum class ReduceName : std::uint8_t { Min, Max, Mean, Final, PeakTime, Integral };
-enum class AcrossName : std::uint8_t { Sum, Mean, Min, Max };
+enum class AcrossName : std::uint8_t { Auto, Sum, Mean, Min, Max };
 
 template <> struct EnumNames<TakeName> {
   static constexpr std::array<std::string_view, 12> names{"peak_force",     "peak_time",     "impulse",     "contact_time",  "first_touch",   "first_contact_time",
@@ -36,18 +35,20 @@ template <> struct EnumNames<ReduceName> {
   static constexpr std::array<std::string_view, 6> names{"min", "max", "mean", "final", "peak_time", "integral"};
 };
 template <> struct EnumNames<AcrossName> {
-  static constexpr std::array<std::string_view, 4> names{"sum", "mean", "min", "max"};
+  static constexpr std::array<std::string_view, 5> names{"auto", "sum", "mean", "min", "max"};
 };
 
 struct Measure {
+  enum class Kind : std::uint8_t { Result, Pair, Frames };
+  Kind kind = Kind::Result;
   std::string name;
   std::string result;                    ///< path in result.json
   std::vector<std::string> pair;         ///< two objects or obstacles
-  std::optional<TakeName> take;          ///< of the pair
-  std::optional<FrameTableName> frames;  ///< table with rows at frames
+  TakeName take = TakeName::PeakForce;   ///< Pair
+  FrameTableName frames = FrameTableName::Energies;  ///< Frames: table with rows at frames
   std::string of;                        ///< object whose rows count; empty: all
   std::string column;
-  std::optional<AcrossName> across;      ///< several rows of a frame; none: the sum of contacts, else the mean
+  AcrossName across = AcrossName::Auto;  ///< several rows of a frame; Auto: the sum of contacts, else the mean
   ReduceName reduce = ReduceName::Final;
 };
 

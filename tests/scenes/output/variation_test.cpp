@@ -114,7 +114,7 @@ TEST_F(Variation, SaysWhatIsWrong) {
   fs::remove(folder_ / "first/states/drops.0003.state");
   EXPECT_EQ(message([&] { return run_scene(scene(), from(3)); }),
             (folder_ / "first/states").string() + ": expected the saved state of frame 3, found none of this frame; --from-frame takes a frame of an earlier run; --from FOLDER names the folder of that run");
-  const Scene other = parse_scene("schema: 1\nduration: 1 s\nframe_rate: 8\nobjects: [{name: ball, particles: {arrange: single, mass: 1}}]\n", "drops.yaml", ".");
+  const Scene other = parse_scene("schema: 1\nduration: 1 s\nframe_rate: 8\nobjects: [{name: ball, particles: {arrange: single, mass: 1, inertia_radius: 1}}]\n", "drops.yaml", ".");
   EXPECT_NE(message([&] { return run_scene(other, from(4)); }).find("state: expected 1 particles, found 2; the scenes must have the same objects"), std::string::npos)
       << message([&] { return run_scene(other, from(4)); });
 }
