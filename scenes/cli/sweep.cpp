@@ -2,7 +2,10 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
+#include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -26,7 +29,7 @@ constexpr const char* kFooter =
     "one value for all points. The grid of all combinations is run, the last key fastest. With --sample: a:b or a:b:log are ranges to draw from.\n\n"
     "DIR holds sweep.json (the plan), a folder for each point and table.csv. The same command again goes on with what is missing; failed\n"
     "points are rows with their outcome. Points are independent: other machines may run them with --point, and --collect joins the rows.\n\n"
-    "Examples: supple sweep two_balls --set objects.left.contact.modulus=1e3:1e6:log9 --set contact.friction=0:0.5:6 --out out/sweep\n"
+    "Examples: supple sweep two_balls --set objects.left.contact.modulus=1e3:1e6:log9 --set objects.left.contact.friction=0:0.5:6 --out out/sweep\n"
     "          supple sweep out/sweep --point 3\n"
     "          supple sweep out/sweep --collect\n"
     "          supple sweep out/sweep --plot left-right.peak_force_n --over objects.left.contact.modulus";
@@ -65,18 +68,28 @@ int run_one(const fs::path& folder, const SweepArguments& a, const implicit::Del
   return row.finished() ? 0 : row.exit_code;
 }
 
+std::string exact(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.17g", value);
+  return text.data();
+}
+
 /// This program, with the options that hold for every point.
 std::vector<std::string> point_command(const SweepArguments& a) {
   std::vector<std::string> words{fs::read_symlink("/proc/self/exe").string(), "sweep", "--quiet", "--threads", std::to_string(a.threads)};
-  if (a.memory > 0.0) words.insert(words.end(), {"--memory", std::to_string(a.memory * 1e-9) + "G"});
-  if (a.time_limit > 0.0) words.insert(words.end(), {"--time-limit", std::to_string(a.time_limit)});
+  if (a.memory > 0.0) words.insert(words.end(), {"--memory", exact(a.memory * 1e-9) + "G"});
+  if (a.time_limit > 0.0) words.insert(words.end(), {"--time-limit", exact(a.time_limit)});
   return words;
 }
 
 int run_all(const fs::path& folder, const SweepArguments& a, const std::atomic<int>& interrupt) {
   ProgressBar bar(a.quiet ? ProgressStyle::None : progress_style(a.progress));
   scenes::SweepOptions options{.jobs = a.jobs, .command = point_command(a), .interrupt = &interrupt};
-  options.progress = [&bar](const scenes::SweepProgress& now) { bar.show({.stage = "points", .frame = now.done, .frame_count = now.count}); };
+  using Clock = std::chrono::steady_clock;
+  options.progress = [&bar, begin = Clock::now()](const scenes::SweepProgress& now) {
+    const double elapsed = std::chrono::duration<double>(Clock::now() - begin).count(), each = elapsed / now.done;
+    bar.show({.stage = "points", .frame = now.done, .frame_count = now.count, .elapsed_s = elapsed, .left_s = each * (now.count - now.done), .frames_per_s = 1.0 / each});
+  };
   const std::vector<scenes::SweepRow> rows = scenes::run_sweep(folder, options);
   bar.finish();
   std::map<std::string, int> outcomes;
@@ -126,7 +139,8 @@ CLI::App* add_sweep(CLI::App& app, SweepArguments& a) {
   verb->add_option("--time-limit", a.time_limit, "stop a point after this many seconds; it is then tried again by the next call")->check(CLI::PositiveNumber);
   verb->add_flag("--outputs", a.outputs, "points also write the pictures, meshes, grids and samples that the scene asks for");
   verb->add_flag("--plan-only", a.plan_only, "write the plan and run nothing");
-  CLI::Option* point = verb->add_option("--point", a.point, "of a folder: run this point only; one that is finished is left as it is")->check(CLI::Range(1, static_cast<int>(scenes::kMostSweepPoints)));
+  CLI::Option* point = verb->add_option("--point", a.point, "of a folder: run this point only; one that is finished is left as it is")
+                           ->check(CLI::Range(1, static_cast<int>(scenes::kMostSweepPoints)));
   verb->add_flag("--collect", a.collect, "of a folder: make the table from the rows that are there")->excludes(point);
   CLI::Option* plot = verb->add_option("--plot", a.plot, "of a folder: draw a column of the table as SVG (with matplotlib, by the Python package)");
   verb->add_option("--over", a.over, "with --plot: key of an axis; twice for a map of colours (default: the first one or two keys)")->needs(plot)->take_all();

@@ -2,9 +2,9 @@
 
     import supple
 
-    table = supple.sweep("bounces", {"objects.ball.contact.modulus": "1e3:1e6:log9", "contact.friction": [0, 0.3]},
-                         measures={"peak": {"pair": ["ball", "floor"], "take": "peak_force"}})
-    print(table["objects.ball.contact.modulus"], table["peak"])
+    table = supple.sweep("two_balls", {"objects.left.contact.modulus": "1e3:1e6:log9", "objects.left.contact.friction": [0, 0.3]},
+                         measures={"peak": {"pair": ["left", "right"], "take": "peak_force"}})
+    print(table["objects.left.contact.modulus"], table["peak"])
 
 Points run in processes of the command line tool, as `supple sweep` runs them. Tables need NumPy only; pandas, pyarrow, matplotlib and SciPy are
 used where a call names them.

@@ -44,7 +44,8 @@ void measure_fields(FieldArchive& archive, Measure& m) {
   need(!archive.given("pair") || m.pair.size() == 2, "pair", "expected two names", "another number", "");
   need(!archive.given("take") || archive.given("pair"), "take", "expected a pair to take it of", "none", "add pair: [A, B]");
   need(!archive.given("pair") || archive.given("take") || table(FrameTableName::Contacts), "pair", "expected it with take, or with frames: contacts", "neither", "");
-  need(!frames || (archive.given("column") && archive.given("reduce")), "frames", "expected column and reduce with it", "neither, or one", "reduce is one of min, max, mean, final, peak_time, integral");
+  need(!frames || (archive.given("column") && archive.given("reduce")), "frames", "expected column and reduce with it", "neither, or one",
+       "reduce is one of min, max, mean, final, peak_time, integral");
   need(frames || !(archive.given("column") || archive.given("reduce") || archive.given("across") || archive.given("of")), "",
        "expected column, reduce, across and of with frames only", "one of them without", "");
   need(!archive.given("of") || table(FrameTableName::Objects) || table(FrameTableName::Particles), "of", "expected it with frames: objects or frames: particles", "another table",
@@ -63,7 +64,11 @@ struct MeasureFile {
     const std::uint32_t source = texts.add(name, text, false);
     root = parse_yaml(texts.text(source), source, tree, faults);
     if (root == nullptr || root->kind != Node::Kind::Mapping) {
-      if (faults.count() == 0) faults.add(root == nullptr ? Mark{source, 1, 1} : root->mark, "", "expected measures by name", root == nullptr ? "an empty file" : root->described(), "write NAME: {pair: [A, B], take: peak_force}");
+      const bool empty = root == nullptr;
+      if (faults.count() == 0) {
+        faults.add(empty ? Mark{source, 1, 1} : root->mark, "", "expected measures by name", empty ? "an empty file" : root->described(),
+                   "write NAME: {pair: [A, B], take: peak_force}");
+      }
       faults.raise();
     }
     const FileAccess no_files{};

@@ -197,7 +197,7 @@ SweepPlan plan_sweep(const SweepRequest& request) {
     if (all.back().kind != SweepValues::Kind::Fixed) plan.parameters.push_back(all.back().key);
   }
   if (plan.parameters.empty()) {
-    refuse_use("--set", "expected a key with several values", "none", "for example --set objects.ball.contact.modulus=1e3:1e6:log9 or --set contact.friction=[0, 0.3]");
+    refuse_use("--set", "expected a key with several values", "none", "for example --set objects.ball.contact.modulus=1e3:1e6:log9 or --set objects.ball.contact.friction=[0, 0.3]");
   }
   plan.points = request.sample.empty() ? grid_of(all) : samples_of(all, read_sampling(request.sample), request.seed);
   if (!request.measures.empty()) {
