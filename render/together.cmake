@@ -1,5 +1,5 @@
 supple_together(
-  "src/image/child_process.cpp src/image/colour_map.cpp src/picture/draw_list.cpp src/image/exr.cpp src/gl/gl.cpp src/gl/gl_renderer.cpp
+  "src/image/colour_map.cpp src/picture/draw_list.cpp src/image/exr.cpp src/gl/gl.cpp src/gl/gl_renderer.cpp
    src/picture/glyphs.cpp src/gl/shaders_geometry.cpp"
   "src/image/film.cpp src/gl/gl_renderer_paint.cpp src/gl/gl_renderer_setup.cpp src/picture/height_map.cpp src/gl/layers.cpp
    src/picture/picture_space.cpp src/image/png.cpp src/gl/renderer.cpp"

@@ -26,6 +26,7 @@
 #include "library.h"
 #include "print.h"
 #include "progress_bar.h"
+#include "sweep.h"
 #include "templates.h"
 #include "usage.h"
 #include "view.h"
@@ -102,6 +103,8 @@ struct Arguments {
   std::string sample_tables;
   std::string fingerprint;
   std::vector<std::string> words;
+  int from_frame = 0;  // 0: not given
+  std::string from_folder;
   int threads = 0;
   int at_once = 0;
   int port = 0;
@@ -182,6 +185,7 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.threads = arguments.threads;
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
+  if (arguments.from_frame > 0) options.from = {.folder = arguments.from_folder, .frame = arguments.from_frame};
   options.simulate_only = arguments.simulate_only;
   options.no_pictures = arguments.no_pictures;
   options.profile = arguments.profile;
@@ -196,9 +200,10 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   return options;
 }
 
-/// Previews have folders of their own, so that they replace no run.
+/// Previews and variations have folders of their own, so that they replace no run.
 fs::path folder_of(const std::string& name, const Arguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
+  if (arguments.from_frame > 0) return fs::path("out") / (name + "_from_" + std::to_string(arguments.from_frame));
   return fs::path("out") / (arguments.preview ? name + "_preview" : name);
 }
 fs::path folder_of(const scenes::Scene& scene, const Arguments& arguments) { return folder_of(scenes::scene_name(scene), arguments); }
@@ -231,6 +236,7 @@ int run(const Arguments& arguments) {
     return 0;
   }
   scenes::RunOptions options = run_options(arguments, folder_of(scene, arguments), bar);
+  if (options.from && options.from->folder.empty()) options.from->folder = fs::path("out") / scenes::scene_name(scene);
   std::optional<tool::ViewServer> server;
   if (arguments.view) {
     server.emplace(scene, tool::ViewServer::Settings{.folder = options.folder, .port = arguments.port, .memory = options.scene_memory, .interrupt = &interrupted});
@@ -427,6 +433,9 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_flags(run_verb, a);
   run_verb->add_flag("--overwrite", a.overwrite, "replace an earlier result in the folder, whatever its scene");
   run_verb->add_flag("--resume", a.resume, "continue from the saved states in the folder; frames whose states are lost or damaged are simulated again");
+  CLI::Option* from_frame = run_verb->add_option("--from-frame", a.from_frame, "start a variation: from the state that an earlier run saved of this frame, with the values of now")
+                                ->check(CLI::Range(1, 1'000'001));
+  run_verb->add_option("--from", a.from_folder, "with --from-frame: folder of that run (default: out/NAME)")->needs(from_frame);
   run_verb->add_flag("--simulate-only", a.simulate_only, "no pictures, film, meshes, grids or samples");
   run_verb->add_flag("--no-pictures", a.no_pictures, "no pictures and no film, which `supple render` makes, in several processes at the same time if that is wanted");
   fingerprint_option(run_verb, a);
@@ -467,6 +476,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
   tool::ViewArguments view_arguments;
   view_arguments.quiet = silent;
   CLI::App* view_verb = tool::add_view(app, view_arguments);
+
+  tool::SweepArguments sweep_arguments;
+  sweep_arguments.quiet = silent;
+  CLI::App* sweep_verb = tool::add_sweep(app, sweep_arguments);
 
   tool::JobArguments job_arguments;
   CLI::App* job_verb = tool::add_job(app, job_arguments);
@@ -558,6 +571,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
     return tool::view(view_arguments, interrupted);
   }
   if (job_verb->parsed()) return tool::write_job(job_arguments);
+  if (sweep_verb->parsed()) {
+    heed_signals();
+    return tool::sweep(sweep_arguments, simulation_options(0).delaunay, interrupted);
+  }
   if (scenes_verb->parsed()) {
     std::cout << tool::list_library();
     return 0;

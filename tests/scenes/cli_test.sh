@@ -54,7 +54,7 @@ expect 4 '--overwrite' run good.yaml --out good --progress none
 expect 0 '' --version
 expect 2 '' run
 expect 2 "supple: expected a command, found 'rn'; did you mean 'run'? (known: run, render" rn good.yaml
-expect 2 "found 'simulate'; known: run, render, export, view, job, info, compare, check, explain, query, bench, reference" simulate good.yaml
+expect 2 "found 'simulate'; known: run, render, export, view, sweep, job, info, compare, check, explain, query, bench, reference" simulate good.yaml
 expect 2 "supple: expected an option, found '--verson'; did you mean '--version'?" --verson
 expect 2 "supple run: expected an option, found '--thread'; did you mean '--threads'?" run good.yaml --thread 2
 expect 2 "supple run: expected an option, found '-out'; did you mean '--out'?" run -out elsewhere good.yaml
@@ -318,7 +318,7 @@ expect 0 '' run film.yaml --out film_KILL --resume --progress none
 
 # Completions and the page for man name every command and option.
 "$supple" describe bash > completion.sh && bash -n completion.sh || fault 'completion for bash is no bash'
-for word in run render export info compare check explain query bench reference new; do
+for word in run render export sweep info compare check explain query bench reference new; do
   completed=$(bash -c "source completion.sh; COMP_WORDS=(supple ${word:0:2}); COMP_CWORD=1; _supple; echo \"\${COMPREPLY[*]}\"")
   [[ " $completed " == *" $word "* ]] || fault "'supple ${word:0:2}' is completed to '$completed'"
 done
@@ -335,6 +335,43 @@ done
 expect 4 'expected a new file, found one that exists' new new_ball
 expect 2 "did you mean 'jelly'" new other --template jely
 expect 2 'expected a name of letters' new 'a;b'
+
+# Sweeps: all points in one command, resumable after a kill, failed points as rows.
+mass=objects.ball.particles.mass
+expect 0 '' sweep good.yaml --set "$mass=1:4:log3" --set 'gravity=[[0, 0, 0], [0, 0, -9.81]]' --out sweep --jobs 2 --progress none
+[[ $(cut -d, -f1-2 sweep/table.csv | tr '\n' ' ') == "point,$mass 1,1 2,1 3,2 4,2 5,4 6,4 " ]] || fault "table of a sweep: $(cat sweep/table.csv)"
+[[ $(grep -c ',done,' sweep/table.csv) == 6 ]] || fault "rows of a sweep: $(cat sweep/table.csv)"
+stamp=$(stat -c %y sweep/point_0003/result.json)
+expect 0 '' sweep good.yaml --set "$mass=1:4:log3" --set 'gravity=[[0, 0, 0], [0, 0, -9.81]]' --out sweep --progress none
+[[ $(stat -c %y sweep/point_0003/result.json) == "$stamp" ]] || fault 'a finished point is run again'
+expect 4 'found another one; choose another --out, or --overwrite' sweep good.yaml --set "$mass=[1, 5]" --out sweep --progress none
+expect 3 "unknown key; did you mean 'mass'?" sweep good.yaml --set 'objects.ball.particles.mas=1:2:3' --out sweep_none
+[[ ! -e sweep_none ]] || fault 'a sweep that is refused leaves a folder'
+expect 2 'expected --out DIR' sweep good.yaml --set "$mass=1:2:3"
+expect 2 'the plan of a folder is fixed' sweep sweep --set "$mass=1:2:3"
+expect 4 'supple sweep SCENE --set KEY=VALUES --out DIR --plan-only writes it' sweep good
+expect 0 '' sweep good.yaml --set "$mass=1:4:log3" --set 'gravity=[[0, 0, 0], [0, 0, -9.81]]' --out shared --plan-only
+[[ $(find shared -type f) == shared/sweep.json ]] || fault "--plan-only writes more: $(find shared)"
+for point in 6 1 3 2 5 4; do expect 0 '' sweep shared --point $point; done
+expect 2 'expected a point from 1 to 6, found 7' sweep shared --point 7
+expect 0 '' sweep shared --collect
+cmp -s sweep/table.csv shared/table.csv || fault 'points on their own give another table'
+"$supple" sweep good.yaml --set "$mass=1:4:log3" --set 'gravity=[[0, 0, 0], [0, 0, -9.81]]' --out killed --jobs 1 --progress none > /dev/null 2>&1 &
+run=$!
+for ((k = 0; k < 500; ++k)); do [[ -e killed/point_0002/row.json ]] && break; sleep 0.02; done
+kill -9 "$run"
+wait "$run" 2> /dev/null
+expect 0 '' sweep killed --progress none
+cmp -s sweep/table.csv killed/table.csv || fault 'a sweep that was killed ends with another table'
+expect 0 '' sweep diverges.yaml --set 'objects.chain.interactions[0]=[{law: bond_frame, stretch: 1e6, rotation: 10}, {law: bond_frame, stretch: 1e-3, rotation: 1e-9}]' --out sweep_fails --progress none
+grep -q '^1,.*,diverged,.*diverged at step' sweep_fails/table.csv || fault "no row of a failed point: $(cat sweep_fails/table.csv)"
+grep -q '^2,.*,done,' sweep_fails/table.csv || fault "a failed point ends a sweep: $(cat sweep_fails/table.csv)"
+
+# A variation of a run.
+expect 0 '' run good.yaml --from-frame 2 --from good --set "$mass=3" --out varied --simulate-only --progress none
+grep -q '"differences": "objects.ball.particles.mass=1 (here 3)"' varied/result.json || fault 'no origin of a variation'
+expect 7 'start a variation from a frame N of this run' run good.yaml --set "$mass=3" --resume --out good --simulate-only --progress none
+expect 2 '--from requires --from-frame' run good.yaml --from good --out varied2
 
 grep -q '"outcome": "diverged"' diverged/result.json || { echo 'no outcome for the diverged run'; failures=$((failures + 1)); }
 expect 3 '' run nan.yaml --out invalid --progress none

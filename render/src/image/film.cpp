@@ -8,11 +8,11 @@
 #include <fstream>
 #include <system_error>
 
-#include "image/child_process.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/core/io/child_process.h"
 #include "supple/core/io/open_temporaries.h"
 #include "supple/render/image.h"
 
@@ -59,7 +59,7 @@ std::string last_line(const std::string& text) {
 
 std::filesystem::path film_program() {
   const std::string name = program_name();
-  std::filesystem::path program = find_program(name);
+  std::filesystem::path program = io::find_program(name);
   if (program.empty()) fail_to_start(name, std::generic_category().message(ENOENT));
   return program;
 }
@@ -162,9 +162,9 @@ void encode_film(const FilmSource& source, const std::filesystem::path& film, co
   arguments.insert(arguments.end(), {"-metadata", "comment=" + identity, unfinished.string()});
 
   const io::OpenTemporary open(unfinished.c_str());
-  ProgramEnd end;
+  io::ProgramEnd end;
   try {
-    end = run_program(program, arguments, interrupt);
+    end = io::run_program(program, arguments, interrupt);
   } catch (const std::system_error& error) {
     fail_to_start(program.string(), error.code().message());
   }

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "output/output_files.h"
+#include "output/run_origin.h"
 #include "output/saved_frames.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
@@ -62,7 +63,7 @@ FrameLooks look_at_frames(const fs::path& folder, const std::string& name, int l
   std::map<Look, std::vector<int>> frames;
   std::vector<std::string> marks(static_cast<std::size_t>(last) + 1);
   const std::set<std::string> present = files_in(folder / kFrames);
-  for (int frame = 1; frame <= last; ++frame) {
+  for (int frame = first_frame_of(folder); frame <= last; ++frame) {
     const fs::path path = frame_path(folder, name, frame);
     if (present.contains(path.filename().string())) {
       std::string& mark = marks[static_cast<std::size_t>(frame)] = render::png_fingerprint(path);

@@ -19,7 +19,7 @@ using PictureSize = std::pair<int, int>;
 [[nodiscard]] std::string picture_fingerprint(const std::string& look, std::uint64_t state_hash);
 [[nodiscard]] std::string look_in(const std::string& fingerprint);
 
-/// Frames 1 .. last by the look of their PNGs, ascending.
+/// Frames by the look of their PNGs, from the first one of the run (1, unless it is a variation) to the last, ascending.
 struct FrameLooks {
   std::string look;          ///< the most frequent one; among equals that of the first frame
   std::vector<int> most;     ///< with this look

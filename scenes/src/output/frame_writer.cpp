@@ -10,6 +10,7 @@
 #include "output/frame_tables.h"
 #include "output/output_files.h"
 #include "output/program_identity.h"
+#include "output/run_origin.h"
 #include "output/search_files.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
@@ -301,7 +302,7 @@ fs::path FrameWriter::make_film(const std::string& name, int last) {
   if (outputs_.film && why_not.empty()) {
     const fs::path film = options_.folder / (name + ".mp4");
     const double frame_rate = scene_.output.film.value_or(FilmDesc{}).frame_rate.value_or(scene_.frame_rate);
-    render::encode_film({options_.folder / "frames", name, 1, last, frame_rate, film_note_of(looks.look, last)}, film, options_.interrupt);
+    render::encode_film({options_.folder / "frames", name, first_frame_of(options_.folder), last, frame_rate, film_note_of(looks.look, last)}, film, options_.interrupt);
     return film;
   }
   const std::string look = looks.others.empty() ? looks.look : std::string();  // of two looks no film is current

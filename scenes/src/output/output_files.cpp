@@ -99,7 +99,7 @@ void remove_outputs(const fs::path& folder, const std::string& name) {
     for (const char* end : {".mp4", "_sheet.png"}) old.push_back(folder / (stem + end));
   }
   for (const char* end : {".usda", ".glb", "_view.html", "_particles.pvd", "_contacts.pvd", "_pairs.pvd", "_samples.pvd"}) old.push_back(folder / (name + end));
-  for (const char* report : {"result.json", "render.json", "export.json"}) old.push_back(folder / report);
+  for (const char* report : {"result.json", "render.json", "export.json", "origin.json"}) old.push_back(folder / report);
   std::error_code ignored;
   for (const fs::path& path : old) fs::remove(path, ignored);
 }

@@ -10,6 +10,7 @@
 #include "output/search_files.h"
 #include "output/spare_memory.h"
 #include "simulation/contact_work.h"
+#include "simulation/pair_contacts.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/accuracy.h"
@@ -63,10 +64,34 @@ ordered_json json_of(const Scene& scene, const StageErrors& errors) {
 
 ordered_json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
+/// Every two objects that touched.
+ordered_json json_of(const Model& model, const std::vector<RunRecord::PairContact>& pairs) {
+  ordered_json list = ordered_json::array();
+  for (const RunRecord::PairContact& pair : pairs) {
+    const bool ended = pair.first_end >= 0.0, met = ended && pair.approach_speed > 0.0;
+    const auto known = [](bool there, double value) { return there ? ordered_json(value) : ordered_json(nullptr); };
+    list.push_back({{"a", pair_member_name(model, pair.objects.a)},
+                    {"b", pair_member_name(model, pair.objects.b)},
+                    {"touches", pair.touches},
+                    {"touching", pair.touching},
+                    {"contact_time_s", pair.contact_time},
+                    {"peak_force_n", pair.peak_force},
+                    {"peak_time_s", pair.peak_time},
+                    {"impulse_ns", vector(pair.impulse)},
+                    {"largest_depth_m", pair.largest_depth},
+                    {"depth_m", pair.depth},
+                    {"first_touch_s", pair.first_begin},
+                    {"first_contact_time_s", known(ended, pair.first_end - pair.first_begin)},
+                    {"approach_speed_m_s", known(met, pair.approach_speed)},
+                    {"rebound_speed_m_s", known(met, pair.rebound_speed)},
+                    {"restitution", known(met, pair.rebound_speed / pair.approach_speed)}});
+  }
+  return list;
+}
+
 }  // namespace
 
-void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken) {
-  const SpareMemory spare(kSpareForJson);
+ordered_json report_of(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken) {
   ordered_json json;
   json["scene"] = scene_name(scene);
   json["title"] = scene.title;
@@ -80,6 +105,12 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
   json["frame_rate"] = scene.frame_rate;
   ordered_json pictures = {{"drawn", result.pictures_drawn}, {"kept", result.pictures_kept}, {"frames_at_once", result.frames_at_once}};
   json["state_hash"] = to_hex(result.state_hash);
+  if (result.origin) {
+    json["origin"] = {{"folder", result.origin->folder.string()},
+                      {"frame", result.origin->frame},
+                      {"state_hash", to_hex(result.origin->state_hash)},
+                      {"differences", result.origin->differences}};
+  }
   json["warnings"] = result.warnings;
   json["units"] = {{"length", "m"}, {"up_axis", "z"}};
   if (simulation != nullptr) {
@@ -120,6 +151,7 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
     for (const auto& o : state.record.overloads) {
       json["overloads"].push_back({{"a", o.a}, {"b", o.b}, {"time_s", o.time}, {"energy_j", o.energy}, {"capacity_j", o.capacity}});
     }
+    json["pairs"] = json_of(simulation->model(), state.record.pair_contacts);
     json["core_impulses"] = state.record.core_impulses;
     const Model& model = simulation->model();
     ordered_json objects = ordered_json::object();
@@ -155,6 +187,12 @@ void write_result_file(const Scene& scene, const RunResult& result, const Simula
   json["peak_memory_mb"] = peak_memory_mb();
   json["wall_s"] = taken.wall;
   json["cpu_s"] = taken.cpu;
+  return json;
+}
+
+void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken) {
+  const SpareMemory spare(kSpareForJson);
+  const ordered_json json = report_of(scene, result, simulation, taken);
   io::write_atomically(result.report, std::string_view(json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"));
 }
 

@@ -1,6 +1,8 @@
 /// result.json: the report of a run.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "supple/scenes/run.h"
 
 namespace supple::scenes {
@@ -11,7 +13,10 @@ struct TimeTaken {
   double cpu = 0.0;  ///< of all threads
 };
 
-/// @param simulation  may be null when the run failed before it began
+/// The content of the report. @param simulation  may be null when the run failed before it began
+[[nodiscard]] nlohmann::ordered_json report_of(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken);
+
+/// Writes it to result.report.
 void write_result_file(const Scene& scene, const RunResult& result, const Simulation* simulation, const TimeTaken& taken);
 
 }  // namespace supple::scenes

@@ -25,6 +25,7 @@
 #include "output/frame_writer.h"
 #include "output/output_files.h"
 #include "output/result_file.h"
+#include "output/run_origin.h"
 #include "output/saved_frames.h"
 #include "output/search_files.h"
 #include "output/stage_errors.h"
@@ -238,6 +239,28 @@ void save_frame(const fs::path& folder, const Simulation& simulation) {
   save_state(state_path(folder, scene_name(simulation.scene()), simulation.frame()), simulation.state(), origin_of(simulation.scene()));
 }
 
+/// The last frame that a run simulates.
+int last_frame_of(const Scene& scene, const RunOptions& options) {
+  return options.frames.empty() ? scene.frame_count() : std::min(scene.frame_count(), *options.frames.rbegin());
+}
+
+/// A variation starts from a frame that the scene and the request have, and in a folder of its own. @throws Error{Usage}
+void check_start(const Scene& scene, const RunOptions& options) {
+  if (!options.from) return;
+  const int last = last_frame_of(scene, options);
+  const auto fail_start = [](std::string place, std::string expected, std::string found, std::string hint) {
+    throw Error(ErrorKind::Usage, Fault{.place = std::move(place), .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = std::move(hint)});
+  };
+  if (options.from->frame < 1 || options.from->frame > last) {
+    fail_start("--from-frame", "expected a frame from 1 to " + std::to_string(last), std::to_string(options.from->frame), "the run goes on from there to its last frame");
+  }
+  if (options.resume) fail_start("--from-frame", "expected it without --resume", "both", "--resume alone continues a variation that was begun");
+  std::error_code ignored;
+  if (fs::equivalent(options.from->folder, options.folder, ignored)) {
+    fail_start("--out", "expected another folder than that of the run that is varied", options.folder.string(), "a variation is a run of its own");
+  }
+}
+
 /// Data of a resumed run.
 struct Resuming {
   const Scene& scene;
@@ -280,13 +303,20 @@ bool take_up(const Resuming& run, int first, int last, UnusableFrames& unusable)
 /// Goes on from the saved states, if there are any. Where nothing is written of frames, those before the first one saved are not
 /// missed. @return false where the run was stopped first
 bool resume(const Resuming& run) {
+  const std::optional<RunOrigin> origin = read_origin(run.options.folder);
+  const int start = origin ? origin->frame : 1;
+  run.result.origin = origin;
   const auto saved = saved_range(run.options.folder, scene_name(run.scene), run.scene.frame_count());
-  if (!saved) return true;
+  if (!saved && !origin) return true;
   UnusableFrames unusable;
-  int first = run.writer.writes_frames() ? 1 : saved->first;
-  if (first > 1 && !usable_frame(run.options.folder, run.scene, first, unusable)) first = 1;
+  if (origin && !usable_frame(run.options.folder, run.scene, start, unusable)) {
+    start_from({origin->folder, start}, run.simulation);
+    save_frame(run.options.folder, run.simulation);
+  }
+  int first = run.writer.writes_frames() ? start : saved ? saved->first : start;
+  if (first > start && !usable_frame(run.options.folder, run.scene, first, unusable)) first = start;
   unusable = {};
-  const bool whole = take_up(run, first, saved->last, unusable);
+  const bool whole = take_up(run, first, saved ? saved->last : start, unusable);
   const std::vector<std::string> sentences = unusable.sentences();
   run.result.warnings.insert(run.result.warnings.end(), sentences.begin(), sentences.end());
   return whole;
@@ -334,7 +364,8 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, last);
     std::vector<int> frames;
-    for (int frame = 1; frame <= last; ++frame) {
+    result.origin = read_origin(options.folder);
+    for (int frame = first_frame_of(options.folder); frame <= last; ++frame) {
       const bool wanted = options.frames.empty() || options.frames.contains(frame);
       // Samples depend on all frames before.
       if (wanted || (outputs.samples && frame < *options.frames.rbegin())) frames.push_back(frame);
@@ -437,6 +468,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
   const OutputRequest outputs = outputs_of(scene, options);
   const std::string name = scene_name(scene);
   check_frames(scene, options.frames);
+  check_start(scene, options);
   io::make_writable_folder(options.folder / "states");
   const FolderLock lock(options.folder);
   remove_temporaries(options.folder, name);
@@ -461,9 +493,13 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     if (!options.resume) remove_outputs(options.folder, name);
     const double before = resident_bytes();
     simulation.emplace(scene, simulation_options(options));
-    const int last_frame = options.frames.empty() ? scene.frame_count() : std::min(scene.frame_count(), *options.frames.rbegin());
+    const int last_frame = last_frame_of(scene, options);
     FrameWriter writer(scene, simulation->model(), options, outputs);
     Reporter report(options, last_frame);
+    if (options.from) {
+      result.origin = start_from(*options.from, *simulation);
+      write_origin(options.folder, *result.origin);
+    }
     if (options.resume && !resume({scene, options, *simulation, writer, report, result, stopped})) return;
     const auto save = [&] {
       save_frame(options.folder, *simulation);

@@ -9,7 +9,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kOtherwise = "or run the scene again: supple run --overwrite";
+constexpr const char* kOtherwise =
+    "or run the scene again: supple run --overwrite, or start a variation from a frame N of this run: supple run SCENE --from-frame N --from THIS_FOLDER --out ANOTHER";
 
 }  // namespace
 

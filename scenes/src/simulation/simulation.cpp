@@ -7,6 +7,7 @@
 #include "simulation/audits.h"
 #include "simulation/contact_work.h"
 #include "simulation/held_volumes.h"
+#include "simulation/pair_contacts.h"
 #include "simulation/pieces.h"
 #include "simulation/stages.h"
 #include "supple/core/cpu_time.h"
@@ -119,6 +120,7 @@ void Simulation::Impl::make_step() {
   begin_step();
   if (awake.empty()) {
     frame.surface.clear();
+    frame.traction_force.clear();
   } else {
     integrate();
   }
@@ -166,10 +168,7 @@ void Simulation::Impl::integrate() {
     advance_divided(time(), dt(), core::halvings(scene.time_step.max_substeps, 1 << state.halvings));
   } else {
     advance_particles(time(), dt());
-    if (implicit) {
-      friction.look(context(), frame);
-      book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
-    }
+    if (implicit) book_implicit(time() + dt(), dt());
   }
   StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
   ++p.calls;
@@ -189,9 +188,11 @@ void Simulation::Impl::check_divergence() {
   throw_diverged(divergence, step, at);
 }
 
-/// Implicit steps have booked their contacts themselves.
+/// Implicit steps have booked their contacts themselves; where all sleeps nothing changes.
 void Simulation::Impl::book_contacts() {
-  if (awake.empty() || core::is_implicit(integrator.settings.method)) return;
+  const bool implicit = core::is_implicit(integrator.settings.method);
+  if (awake.empty() || !implicit) book_pair_contacts(context(), frame, {.end = time(), .size = dt(), .mean_forces = implicit, .depths = {}}, state);
+  if (awake.empty() || implicit) return;
   book_pair_work(frame.surface.summary, frame.pair_power, dt(), state.record);
   if (state.substep == (1 << state.halvings) && contact_on()) friction.look(context(), frame);
 }
@@ -206,14 +207,24 @@ void Simulation::Impl::advance_particles(double begin, double h) {
     evaluate_forces(at_state, at, out);
   };
   core::ImplicitContact contact = implicit_contact();
+  EndDepths depths;
+  if (contact.find) {
+    contact.find = [&depths, find = std::move(contact.find)](const core::ParticleState& pose, double at, core::ContactPoints& out) {
+      find(pose, at, out);
+      depths.predict(pose, out);
+    };
+  }
   const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr}, begin, h,
                                                 {state.particles, state.kick, state.ledger}, {executor, workspace, integrator_workspace});
   book_work(report);
   if (!core::is_implicit(method)) return;
+  end_depths = depths.at_end(state.particles, frame.surface.summary);
   frame.pair_power.resize(contact.load.size());
+  frame.traction_force.resize(contact.load.size());
   frame.friction_speed.resize(contact.load.size());
   for (std::size_t k = 0; k < contact.load.size(); ++k) {
     frame.pair_power[k] = contact.load[k].dissipated / h;
+    frame.traction_force[k] = contact.load[k].force;
     const double friction_of_pair = collision::material_of(frame.bodies, rules, frame.surface.summary[k].bodies).friction;
     frame.friction_speed[k] = friction_of_pair > 0.0 ? contact.load[k].stick_speed : 0.0;
   }
@@ -252,8 +263,14 @@ void Simulation::Impl::advance_divided(double begin, double h, int halvings) {
     advance_divided(begin, 0.5 * h, halvings - 1);
     return advance_divided(begin + 0.5 * h, 0.5 * h, halvings - 1);
   }
+  book_implicit(begin + h, h);
+}
+
+/// What the contacts of an implicit step did, before it is divided no further.
+void Simulation::Impl::book_implicit(double end, double h) {
   friction.look(context(), frame);
   book_pair_work(frame.surface.summary, frame.pair_power, h, state.record);
+  book_pair_contacts(context(), frame, {.end = end, .size = h, .mean_forces = true, .depths = end_depths}, state);
 }
 
 /// Substeps stay on the grid of the frame.

@@ -48,6 +48,7 @@ struct Simulation::Impl {
   IntegratorPlan integrator;
   core::IntegratorWorkspace integrator_workspace;
   core::StepReport work;  ///< of all steps of this object
+  std::vector<double> end_depths;  ///< of an implicit step, by pair of `frame.surface` [m]
 
   // Results at the current state; in a frame of their own, so that reading them cannot disturb stepping.
   Frame pulled;
@@ -78,6 +79,7 @@ struct Simulation::Impl {
   void advance_divided(double begin, double h, int halvings);
   [[nodiscard]] bool creates_energy(const Energies& before, const core::Ledger& ledger, const Energies& now) const;
   void book_contacts();
+  void book_implicit(double end, double h);
   void evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out);
   core::ImplicitContact implicit_contact();
   void commit_friction();

@@ -1,6 +1,7 @@
 #include "supple/scenes/state.h"
 #include "supple/scenes/state_bytes.h"
 
+#include <array>
 #include <cstring>
 #include <optional>
 #include <span>
@@ -13,7 +14,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
-constexpr std::uint64_t kVersion = 13;
+constexpr std::uint64_t kVersion = 14;
 constexpr std::size_t kLargestFile = std::size_t{8} << 30;
 
 void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
@@ -23,6 +24,41 @@ void read(StateReader& in, Vec3& v) {
   in.read(one);
   if (one.size() != 1) throw Error(ErrorKind::Corrupt, Fault{.expected = "expected one vector in the saved state"});
   v = one[0];
+}
+
+/// Members of PairContact that are numbers, and those that are vectors.
+std::array<double*, 12> numbers_of(RunRecord::PairContact& p) {
+  return {&p.contact_time,  &p.peak_force, &p.peak_time,    &p.largest_depth, &p.first_begin, &p.first_end,
+          &p.approach_speed, &p.rebound_speed, &p.depth, &p.depth_before, &p.last_step, &p.touch_begin};
+}
+std::array<Vec3*, 4> vectors_of(RunRecord::PairContact& p) { return {&p.impulse, &p.force, &p.touch_impulse, &p.touch_velocity}; }
+
+void save_contacts(StateWriter& out, std::vector<RunRecord::PairContact> pairs) {
+  out.write(std::uint64_t{pairs.size()});
+  for (RunRecord::PairContact& pair : pairs) {
+    for (const std::uint64_t value : {std::uint64_t{pair.objects.a}, std::uint64_t{pair.objects.b}, pair.touches, std::uint64_t{pair.touching}, std::uint64_t{pair.begun}}) {
+      out.write(value);
+    }
+    for (const double* value : numbers_of(pair)) out.write(*value);
+    for (const Vec3* value : vectors_of(pair)) write(out, *value);
+  }
+}
+
+void load_contacts(StateReader& in, std::vector<RunRecord::PairContact>& pairs) {
+  std::uint64_t n = 0;
+  in.read(n);
+  pairs.clear();
+  for (std::uint64_t i = 0; i < n; ++i) {
+    RunRecord::PairContact pair;
+    std::uint64_t a = 0, b = 0, touching = 0, begun = 0;
+    for (std::uint64_t* value : {&a, &b, &pair.touches, &touching, &begun}) in.read(*value);
+    pair.objects = {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)};
+    pair.touching = touching != 0;
+    pair.begun = begun != 0;
+    for (double* value : numbers_of(pair)) in.read(*value);
+    for (Vec3* value : vectors_of(pair)) read(in, *value);
+    pairs.push_back(pair);
+  }
 }
 
 void save_record(StateWriter& out, const RunRecord& r) {
@@ -54,6 +90,7 @@ void save_record(StateWriter& out, const RunRecord& r) {
     out.write(pair.work);
     out.write(pair.power);
   }
+  save_contacts(out, r.pair_contacts);
 }
 
 void load_record(StateReader& in, RunRecord& r) {
@@ -99,6 +136,7 @@ void load_record(StateReader& in, RunRecord& r) {
     pair.bodies = {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)};
     r.pair_work.push_back(pair);
   }
+  load_contacts(in, r.pair_contacts);
 }
 
 Fault fault_of(const std::filesystem::path& path, std::string expected, std::string found, std::string hint) {
@@ -232,7 +270,11 @@ State state_of_bytes(const std::string& place, std::span<const std::byte> bytes,
   in.read(scene);
   in.read(keys);
   in.read(program);
-  if (scene != origin.scene) refuse_scene(path, origin, keys, wanted.otherwise);
+  if (wanted.differences != nullptr) {
+    *wanted.differences = origin.keys && !keys.empty() ? differences(keys_in(*origin.keys), keys_in(keys)).found : std::string();
+  } else if (scene != origin.scene) {
+    refuse_scene(path, origin, keys, wanted.otherwise);
+  }
   State state;
   for (std::int32_t* value : {&state.frame, &state.substep, &state.halvings}) {
     std::uint64_t raw = 0;

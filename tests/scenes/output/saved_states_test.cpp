@@ -101,7 +101,8 @@ TEST_F(SavedStates, OfAnotherSceneAreRefusedByTheKeysThatDiffer) {
   const std::vector<std::string> heavy{"objects.left.particles.mass=2"};
   expect_refused(run_scene(scene(heavy), options(true)),
                  state(1).string() + ": expected a state of this scene, found one of a scene with objects.left.particles.mass=0.5 (here 2); "
-                                     "its scene is this one with --set objects.left.particles.mass=0.5, or run the scene again: supple run --overwrite");
+                                     "its scene is this one with --set objects.left.particles.mass=0.5, or run the scene again: supple run --overwrite, or start a "
+                                     "variation from a frame N of this run: supple run SCENE --from-frame N --from THIS_FOLDER --out ANOTHER");
   const Scene other = parse_scene("schema: 1\nduration: 0.5 s\nframe_rate: 8\nobjects: [{name: ball, particles: {inertia_radius: 1}}]\n", "drops.yaml", ".");
   const RunResult result = render_run(other, options());
   EXPECT_EQ(result.exit_code, 7);

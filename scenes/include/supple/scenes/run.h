@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -29,12 +30,19 @@ struct Progress {
   double frames_per_s = 0.0;  ///< of the frames done since the first report; 0 while there is none
 };
 
+/// A state of another run that a run starts from.
+struct RunStart {
+  std::filesystem::path folder;  ///< of that run
+  int frame = 1;
+};
+
 struct RunOptions {
   std::filesystem::path folder;                 ///< output folder
   std::set<int> frames{};                        ///< frames to output; empty: all. `run_scene` simulates no further than the last of them
   int threads = 0;                              ///< 0: all of the machine
   bool overwrite = false;                       ///< a folder with a result may be replaced
   bool resume = false;                          ///< continue from the states in the folder; frames whose states are lost or damaged are simulated again
+  std::optional<RunStart> from{};               ///< start at this frame, from a saved state of a scene with the same objects and other values (Simulation::adopt)
   bool simulate_only = false;                   ///< no images, meshes, grids, samples or film
   bool skip = true;                             ///< see SimulationOptions::skip
   bool profile = false;
@@ -65,6 +73,14 @@ struct PictureTimes {
   }
 };
 
+/// Where a run started that is a variation of another.
+struct RunOrigin {
+  std::filesystem::path folder;  ///< of the other run
+  int frame = 1;
+  std::uint64_t state_hash = 0;  ///< of its state there
+  std::string differences;       ///< keys of that run's scene that differ, its values first: "objects.ball.particles.mass=2 (here 1)"; empty: none
+};
+
 struct RunResult {
   std::string outcome;      ///< done, diverged, interrupted, limit, io, invalid
   std::string reason;       ///< empty when done
@@ -82,6 +98,7 @@ struct RunResult {
   SearchCounts searches;    ///< counts of the meshes of all frames, kept ones included
   PictureTimes pictures;
   StageErrors errors;       ///< of what `run_scene` simulated
+  std::optional<RunOrigin> origin{};  ///< of a variation
 };
 
 /// Checks the requirements of pictures, as runs that draw do before they begin: the files of textures, and the path tracer.

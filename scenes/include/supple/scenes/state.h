@@ -55,6 +55,31 @@ struct RunRecord {
     double power = 0.0;                ///< at the end of the last step [W]
   };
   std::vector<PairWork> pair_work;     ///< of all pairs with dissipation, sorted by bodies
+  /// Contact of two objects, or of an object and an obstacle, so far: summed over their bodies, taken at the end of every step. A and B are their numbers, those of
+  /// obstacles after those of objects; forces are those on A, of implicit steps the means over the step.
+  struct PairContact {
+    collision::BodyPair objects;
+    std::uint64_t touches = 0;         ///< contacts that began
+    double contact_time = 0.0;         ///< [s]
+    double peak_force = 0.0;           ///< [N]
+    double peak_time = 0.0;            ///< [s]
+    Vec3 impulse = Vec3::Zero();       ///< integral of the force [N s]
+    double largest_depth = 0.0;        ///< overlap of the undeformed bodies [m]
+    double first_begin = 0.0;          ///< of the first contact [s]
+    double first_end = -1.0;           ///< [s]; negative: it lasts
+    double approach_speed = 0.0;       ///< before the first contact: of the centres of mass against its impulse [m/s]
+    double rebound_speed = 0.0;        ///< after it, along its impulse [m/s]
+    // The present contact, or the last one.
+    bool touching = false;
+    bool begun = false;                ///< in the last step
+    Vec3 force = Vec3::Zero();         ///< at the end of the last step; zero without contact [N]
+    double depth = 0.0, depth_before = 0.0;  ///< at the end of the last step and of the one before [m]
+    double last_step = 0.0;            ///< length of the last step in contact [s]
+    double touch_begin = 0.0;          ///< [s]
+    Vec3 touch_impulse = Vec3::Zero(); ///< [N s]
+    Vec3 touch_velocity = Vec3::Zero();  ///< of the centre of mass of A relative to that of B before it [m/s]
+  };
+  std::vector<PairContact> pair_contacts;  ///< of all pairs that ever touched, sorted by objects
   std::uint64_t core_impulses = 0;     ///< pairs that hard cores turned back
   bool valid = false;
 };
@@ -91,6 +116,8 @@ struct StateWanted {
   std::optional<int> frame{};  ///< the state at this frame, as written by `supple run`; absent: any
   bool same_program = false;   ///< saved by this build of the program, whose results have the same bits
   std::string otherwise{};     ///< what else to do about a state of another scene: "or ..."
+  /// Not null: a state of another scene is accepted, and this says in which keys they differ: "objects.ball.particles.mass=2 (here 1)".
+  std::string* differences = nullptr;
 };
 
 /// A damaged file: it is truncated, or a byte of it changed.

@@ -1,3 +1,4 @@
+/// @file supple/core/io/child_process.h
 /// Child programs that never outlive the call that waits for them.
 #pragma once
 
@@ -6,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace supple::render {
+namespace supple::io {
 
 /// How a program ended.
 struct ProgramEnd {
@@ -27,4 +28,4 @@ struct ProgramEnd {
 [[nodiscard]] ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::string> words,
                                      const std::atomic<int>* interrupt);
 
-}  // namespace supple::render
+}  // namespace supple::io

@@ -1,4 +1,4 @@
-#include "image/child_process.h"
+#include "supple/core/io/child_process.h"
 
 #include <fcntl.h>
 #include <linux/close_range.h>
@@ -19,7 +19,7 @@
 #include "supple/core/interrupt.h"
 #include "supple/core/io/descriptor.h"
 
-namespace supple::render {
+namespace supple::io {
 namespace {
 
 constexpr int kNotStarted = 127;            // as shells have it
@@ -29,13 +29,13 @@ constexpr std::size_t kMostKept = 65536;    // bytes of messages
 [[noreturn]] void fail(int code) { throw std::system_error(code, std::system_category()); }
 
 struct Pipe {
-  io::Descriptor read, write;
+  Descriptor read, write;
 };
 
 Pipe make_pipe() {
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail(errno);
-  Pipe pipe{io::above_standard(ends[0]), io::above_standard(ends[1])};
+  Pipe pipe{above_standard(ends[0]), above_standard(ends[1])};
   if (!pipe.read.is_open() || !pipe.write.is_open()) fail(errno);
   return pipe;
 }
@@ -121,14 +121,14 @@ class Child {
     if (process_ <= 0) return;
     ::kill(-process_, SIGKILL);
     int status = 0;
-    io::retried([&] { return ::waitpid(process_, &status, 0); });
+    retried([&] { return ::waitpid(process_, &status, 0); });
   }
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
   /// Whether it has ended; `status` is then set.
   bool ended(int& status) {
-    const pid_t found = io::retried([&] { return ::waitpid(process_, &status, WNOHANG); });
+    const pid_t found = retried([&] { return ::waitpid(process_, &status, WNOHANG); });
     if (found == 0) return false;
     process_ = 0;
     return true;
@@ -165,10 +165,10 @@ pid_t start_child(Start start) {
 }
 
 /// Reads the available bytes; false at the end of the stream.
-bool take(const io::Descriptor& pipe, std::string& messages) {
+bool take(const Descriptor& pipe, std::string& messages) {
   std::array<char, 4096> buffer;
   for (;;) {
-    const ssize_t count = io::retried([&] { return ::read(pipe.get(), buffer.data(), buffer.size()); });
+    const ssize_t count = retried([&] { return ::read(pipe.get(), buffer.data(), buffer.size()); });
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return true;
     if (count <= 0) return false;
     messages.append(buffer.data(), static_cast<std::size_t>(count));
@@ -197,7 +197,7 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
-  const io::Descriptor null = io::open_file("/dev/null", O_RDWR);
+  const Descriptor null = open_file("/dev/null", O_RDWR);
   if (!null.is_open()) fail(errno);
   Pipe messages = make_pipe(), failure = make_pipe();
   const Pipe life = make_pipe();
@@ -206,7 +206,7 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   (void)failure.write.close();
 
   int code = 0;  // of exec; where that goes well the pipe is closed by it
-  const ssize_t received = io::retried([&] { return ::read(failure.read.get(), &code, sizeof code); });
+  const ssize_t received = retried([&] { return ::read(failure.read.get(), &code, sizeof code); });
   if (received == static_cast<ssize_t>(sizeof code)) fail(code);
   ProgramEnd end;
   ::fcntl(messages.read.get(), F_SETFL, O_NONBLOCK);
@@ -221,4 +221,4 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   return end;
 }
 
-}  // namespace supple::render
+}  // namespace supple::io
