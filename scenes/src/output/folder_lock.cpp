@@ -12,7 +12,7 @@ namespace supple::scenes {
 
 FolderLock::FolderLock(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / ".lock";
-  file_ = io::open_file(path, O_RDWR | O_CREAT, 0644);
+  file_ = io::open_file(path, O_RDWR | O_CREAT | O_NOFOLLOW, 0644);
   if (!file_.is_open()) {
     throw Error(ErrorKind::Io, Fault{.place = path.string(),
                                      .key = {},
