@@ -1,4 +1,5 @@
 """Rows that call tests and benchmarks and count by their output."""
+import csv
 import json
 import pathlib
 import re
@@ -111,6 +112,93 @@ def contacts(context, asked):
     outcome.reached, outcome.faults = told["touching"], told["faults"]
     outcome.note = (f"and {told['apart']} pairs apart; largest relative errors: forces {told['forces']:.0e}, moments {told['moments']:.0e}, "
                     f"pressures {told['pressures']:.0e}, surfaces {told['surfaces']:.0e}")
+    return outcome
+
+
+ROUND_OFF = 1e-9  # relative
+SOFT_BODY = """schema: 1
+duration: 0.1
+frame_rate: 100
+gravity: [0, 0, -9.81]
+ground: {{height: 0, modulus: 1e5, friction: 0.4}}
+objects:
+  - name: body
+    particles: {{arrange: file, file: {points}}}
+    skeleton: [{{shape: point, kernel: {{type: wyvill, radius: 0.12}}}}]
+    contact: {{modulus: 2e4, friction: 0.3, dissipation: 0.5}}
+    {kind}
+  - name: press
+    particles: {{arrange: single, at: [0.02, 0.01, 0.39], velocity: [0.3, 0, -1], mass: 1}}
+    skeleton: [{{shape: point, kernel: {{type: wyvill, radius: 0.3}}}}]
+    contact: {{modulus: 1e4, friction: 0.2}}
+output: {{particles: csv}}
+"""
+SOFT_KINDS = {
+    "bonds": "interactions: [{law: bond_frame, within: 0.15, stretch: 300, rotation: 0.2}, {law: friction, within: 0.15, linear: 0.4, angular: 0.01}]",
+    "pairs": "interactions: [{law: lennard_jones, geometric: true, rest_distance: 0.07, depth: 0.01, cut_off: 0.2}]",
+    "cohesion": "interactions: [{law: cohesion, within: 0.2, rest_distance: 0.07, maximum_distance: 0.1, maximum_force: 0.5}]",
+    "bodies": "separate: true",
+    "repulsion": "repulsion: {force: 1, distance: 0.06, length: 0.02, own: true}",
+}
+
+
+def soft_body(pick):
+    """Particles of a lump at random: x, y, z, mass, velocity."""
+    return [[0.08 * (i - 1) + pick.uniform(-0.01, 0.01), 0.08 * (j - 1) + pick.uniform(-0.01, 0.01), 0.07 + 0.08 * k + pick.uniform(-0.01, 0.01),
+             pick.uniform(0.01, 0.03), *[pick.uniform(-1.0, 1.0) for _ in range(3)]] for i in range(3) for j in range(3) for k in range(2)]
+
+
+def motion_of(context, folder, name, kind, points, order):
+    """Positions and velocities of all particles after three frames, by the numbers that they have in `points`."""
+    (folder / f"{name}.csv").write_text("x,y,z,mass,vx,vy,vz\n" + "".join(",".join(map(repr, points[k])) + "\n" for k in order))
+    scene = folder / f"{name}.yaml"
+    scene.write_text(SOFT_BODY.format(points=f"{name}.csv", kind=kind))
+    ended = run_process([context.tool, "run", scene, "--out", folder / name, "--frames", "1-4", "--progress", "none", "--threads", 1])
+    if ended.code != 0:
+        raise RuntimeError(f"{scene} ended with {ended.code}: {ended.err}")
+    with open(folder / name / "particles" / f"{name}.0004.csv", newline="") as table:
+        rows = list(csv.DictReader(table))
+    numbers = [[float(row[key]) for key in ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")] for row in rows]
+    found = [None] * len(order)
+    for row, k in zip(numbers, order):
+        found[k] = row
+    return found + numbers[len(order):]
+
+
+def renumbered(context, asked):
+    """A lump of particles in other orders, pressed onto the ground: the same motion but for rounding."""
+    outcome, pick = Outcome(), context.random("renumbered")
+    folder = context.folder("renumbered")
+    orders = -(-asked // len(SOFT_KINDS))
+    for kind, keys in SOFT_KINDS.items():
+        points = soft_body(pick)
+        rest = motion_of(context, folder, f"{kind}_rest", keys, points, list(range(len(points))))
+        for number in range(orders):
+            order = pick.sample(range(len(points)), len(points))
+            moved = motion_of(context, folder, f"{kind}_{number}", keys, points, order)
+            change = max(abs(a - b) for one, other in zip(rest, moved) for a, b in zip(one, other))
+            outcome.reached += 1
+            if not change <= ROUND_OFF * max(abs(a) for row in rest for a in row):
+                outcome.faults.append(f"{kind}, order {number}: differs by {change:.1e}")
+    return outcome
+
+
+def invariance(context, asked):
+    """contact_invariance: contacts exchanged, turned and moved, made smaller and larger, each a case for every pose; and particles numbered otherwise."""
+    outcome = renumbered(context, 25)
+    ended = run_process([context.bin / "contact_invariance", 5, "all", "auto", context.seed], timeout=LONG_S)
+    poses = {}
+    for line in ended.out.splitlines():
+        told = json.loads(line)
+        case = told["name"].rsplit("/", 1)[0]
+        poses[case] = max(poses.get(case, 0), told["poses"])
+        if told["beyond_1e-9"]:
+            outcome.faults.append(f"{told['name']}: {told['beyond_1e-9']} of {told['poses']} poses differ, by {told['largest_change']}")
+    if ended.code != 0:
+        outcome.faults.append(f"contact_invariance ended with {ended.code}: {ended.err[:300]}")
+    outcome.note = f"{sum(poses.values())} of contacts, each for 4 errors, {outcome.reached} of particles numbered otherwise"
+    outcome.reached += sum(poses.values())
+    outcome.faults += [f"{outcome.reached} cases instead of {asked}"] if outcome.reached < asked else []
     return outcome
 
 
