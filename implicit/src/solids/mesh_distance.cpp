@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "supple/core/interrupt.h"
+
 namespace supple::implicit {
 namespace {
 
@@ -72,6 +74,7 @@ void MeshDistance::lay_lattice() {
   known_.assign(distance_.size(), 0);
   for (std::size_t k = 0; k < size_[2]; k += kBlock) {
     for (std::size_t j = 0; j < size_[1]; j += kBlock) {
+      heed_scope();
       for (std::size_t i = 0; i < size_[0]; i += kBlock) search(i, j, k, kBlock);
     }
   }
@@ -192,6 +195,7 @@ void MeshDistance::find_poor_cells() {
   }
   for (std::size_t k = 1; k + 2 < size_[2]; ++k) {
     for (std::size_t j = 1; j + 2 < size_[1]; ++j) {
+      heed_scope();
       for (std::size_t i = 1; i + 2 < size_[0]; ++i) {
         const double here = static_cast<double>(distance_[node(i, j, k)]) * unit_;
         if (std::abs(here) > kNear * cell_) continue;  // also where it is not known
