@@ -1,6 +1,7 @@
 """Rows that call tests and benchmarks and count by their output."""
 import csv
 import json
+import math
 import pathlib
 import re
 import subprocess
@@ -214,7 +215,7 @@ def fuzz(context, asked):
     outcome = Outcome()
     for name, share in FUZZ_TARGETS.items():
         corpus = context.sources / "tests/fuzz/corpus" / name
-        changes = max(1, int(share * asked / len(FUZZ_TARGETS) / len(list(corpus.iterdir()))))
+        changes = max(1, math.ceil(share * asked / sum(FUZZ_TARGETS.values()) / len(list(corpus.iterdir()))))
         folder = context.folder("fuzz_" + name)
         ended = run_process([context.bin / ("fuzz_" + name), "--changes", changes, corpus], timeout=LONG_S, cwd=folder)
         tried = re.search(r"^(\d+) inputs", ended.out)
