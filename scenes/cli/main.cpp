@@ -145,7 +145,7 @@ int report(const scenes::RunResult& result, const Arguments& arguments) {
   if (result.outcome != "done") {
     print(std::cerr, "%s\n", result.reason.c_str());
     print(std::cerr, "stopped: %s, last good frame %d, %s\n", result.outcome.c_str(), result.frames,
-                 result.report.c_str());
+          result.report.empty() ? "the report of the earlier run stays" : result.report.c_str());
     return result.exit_code;
   }
   if (!arguments.quiet) {

@@ -1,15 +1,15 @@
 #include "view.h"
 
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
+#include <vector>
 
 #include "library.h"
 #include "print.h"
 #include "supple/core/error.h"
+#include "supple/core/io/atomic_file.h"
 #include "supple/scenes/limits.h"
 #include "supple/scenes/read_scene.h"
 #include "view_server.h"
@@ -19,15 +19,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kLargestReport = std::size_t{1} << 24;  // [byte]
+
 /// The scene file of a run, by its report. @throws Error{Io}
 std::string scene_of(const fs::path& folder) {
-  std::ifstream file(folder / "result.json");
-  const nlohmann::json report = nlohmann::json::parse(std::istreambuf_iterator<char>(file), {}, nullptr, false);
+  const fs::path path = folder / "result.json";
+  const bool there = fs::exists(path);
+  const std::vector<std::byte> bytes = there ? io::read_file(path, kLargestReport) : std::vector<std::byte>();
+  const char* text = reinterpret_cast<const char*>(bytes.data());
+  const nlohmann::json report = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
   if (report.is_object() && report.contains("scene_file") && report["scene_file"].is_string()) return report["scene_file"];
-  throw Error(ErrorKind::Io, Fault{.place = (folder / "result.json").string(),
+  throw Error(ErrorKind::Io, Fault{.place = path.string(),
                                    .key = {},
                                    .expected = "expected the report of a run with its 'scene_file'",
-                                   .found = file.is_open() ? "none" : "no such file",
+                                   .found = there ? "none" : "no such file",
                                    .hint = "name the scene instead: supple view SCENE --out " + folder.string()});
 }
 

@@ -181,6 +181,35 @@ for file in pipe.csv ../good.yaml /etc/hostname '"p.csv\0x"'; do
   [[ $code == 3 || $code == 4 ]] && grep -qE 'expected a (regular file|file inside)' err.txt || fault "check with file $file: exit $code, $(cat err.txt)"
 done
 rm pipe.csv
+
+# Every file that a command opens is a regular one: a pipe in its place is refused or replaced, not waited for.
+sed 's/radius: 0.5}}\]/radius: 0.5}}]\noutput: {images: {size: [32, 24], samples: 1}, film: true, particles: csv, mesh: [ply, usd], cell: 0.3}/' good.yaml > piped.yaml
+"$supple" run piped.yaml --out piped --progress none > /dev/null 2>&1 || fault 'the run whose files become pipes failed'
+"$supple" export piped.yaml --out piped --mesh gltf --progress none > /dev/null 2>&1
+for file in $(cd piped && find . -name .lock -o -type f ! -name '*.000[23].*'); do
+  for command in 'info piped_now' 'compare piped_now piped --out compared' 'render piped.yaml --out piped_now' 'render piped.yaml --out piped_now --overwrite' \
+    'export piped.yaml --out piped_now --particles csv' 'run piped.yaml --out piped_now --resume' 'run piped.yaml --out piped_now --overwrite' \
+    'view piped_now --page page.html' 'view piped.yaml --out piped_now' "query forces piped.yaml --state piped_now/$file"; do
+    rm -rf piped_now compared page.html
+    cp -r piped piped_now
+    rm "piped_now/$file"
+    mkfifo "piped_now/$file"
+    # shellcheck disable=SC2086  # words of a command
+    timeout --signal=KILL 20 "$supple" $command > out.txt 2> err.txt < /dev/null
+    code=$?
+    [[ $code == 0 || $code == 4 || $code == 7 ]] || fault "a pipe as $file, $command: exit $code, $(cat err.txt)"
+  done
+done
+for command in 'check' 'run' 'explain' 'query forces' 'query field good.yaml --points' 'view' 'info' 'compare piped'; do
+  rm -f pipe.yaml
+  mkfifo pipe.yaml
+  # shellcheck disable=SC2086  # words of a command
+  timeout --signal=KILL 20 "$supple" $command pipe.yaml > out.txt 2> err.txt < /dev/null
+  code=$?
+  [[ $code == 4 ]] || fault "a pipe, $command: exit $code, $(cat err.txt)"
+done
+rm -rf pipe.yaml piped piped_now compared page.html
+
 # Links, and allowed files. Nothing of a file elsewhere is shown.
 mkdir -p inside elsewhere
 echo '0, 0, 0' > elsewhere/points.csv

@@ -37,15 +37,27 @@ def by_libraries(what, context, asked):
     return outcome
 
 
+def checked(context, path):
+    """`supple check`. Others may use the processor and its caches, too: the quickest of three where an answer is late."""
+    quickest = None
+    for _ in range(3):
+        ended = run_process([context.tool, "check", path], timeout=120, memory=RUN_MEMORY)
+        if quickest is None or ended.processor_s < quickest.processor_s:
+            quickest = ended
+        if quickest.processor_s <= MOST_SECONDS:
+            break
+    return quickest
+
+
 def fault_of_check(path, ended):
-    """Of `supple check`: crashes, and refusals that are slow, large or without a place."""
+    """Of `supple check`: crashes, answers that are slow or take much memory, and refusals without a place."""
     fault = fault_of_exit(ended, {0, 3, 4, 6})
-    if fault or ended.code == 0:
+    if fault:
         return fault
     if ended.processor_s > MOST_SECONDS:
-        return f"refused after {ended.processor_s:.1f} s of processor time"
+        return f"exit {ended.code} after {ended.processor_s:.1f} s of processor time"
     if ended.most_bytes > MOST_BYTES:
-        return f"refused after taking {ended.most_bytes / MB:.0f} MB"
+        return f"exit {ended.code} after taking {ended.most_bytes / MB:.0f} MB"
     if ended.code == 3 and not re.match(re.escape(str(path)) + r":\d+:\d+: ", ended.err.replace("warning: ", "")) and str(path.parent) not in ended.err:
         return f"a message without file:line:column: {ended.err[:200]}"
     return ""
@@ -63,7 +75,7 @@ def mutated_by_tool(context, asked):
             shutil.copy(path, folder)
     passed = 0
     for path in sorted(folder.glob("scene_*.yaml")):
-        ended = run_process([context.tool, "check", path], timeout=120, memory=RUN_MEMORY)
+        ended = checked(context, path)
         fault = fault_of_check(path, ended)
         if not fault and ended.code == 0:
             passed += 1
@@ -126,7 +138,7 @@ def hostile(context, asked):
     for path in golden:
         shutil.copy(path, folder / path.name)
     for path in sorted(folder.glob("*.yaml"))[:asked]:
-        ended = run_process([context.tool, "check", path], timeout=30, memory=RUN_MEMORY)
+        ended = checked(context, path)
         fault = fault_of_check(path, ended) or ("accepted" if ended.code == 0 else "")
         outcome.reached += 1
         outcome.faults += [f"{path.name}: {text}" for text in [fault] if text]

@@ -24,6 +24,18 @@ namespace {
                                    .hint = {}});
 }
 
+/// @throws Error{Io} where what is open is neither a regular file nor a folder, whose reading fails by itself
+void expect_regular(const std::filesystem::path& path, const Descriptor& descriptor) {
+  struct stat status {};
+  if (::fstat(descriptor.get(), &status) != 0) fail(path, "cannot be read", errno);
+  if (S_ISREG(status.st_mode) || S_ISDIR(status.st_mode)) return;
+  throw Error(ErrorKind::Io, Fault{.place = path.string(),
+                                   .key = {},
+                                   .expected = "expected a regular file",
+                                   .found = S_ISFIFO(status.st_mode) ? "a pipe" : "a device or a socket",
+                                   .hint = {}});
+}
+
 /// Makes the rename itself durable; a file system that cannot do it still has the file.
 void sync_folder(const std::filesystem::path& folder) {
   const Descriptor descriptor = open_file(folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
@@ -89,7 +101,7 @@ void AtomicFile::commit() {
 }
 
 void rename_whole(const std::filesystem::path& from, const std::filesystem::path& to) {
-  Descriptor descriptor = open_file(from, O_RDONLY);
+  Descriptor descriptor = open_to_read(from);
   const int code = descriptor.is_open() ? publish(descriptor, from, to) : errno;
   if (code != 0) fail(to, "cannot be written", code);
 }
@@ -104,8 +116,14 @@ void write_atomically(const std::filesystem::path& path, std::string_view text) 
   write_atomically(path, std::as_bytes(std::span<const char>(text)));
 }
 
+Descriptor open_to_read(const std::filesystem::path& path) {
+  Descriptor descriptor = open_file(path, O_RDONLY | O_NONBLOCK | O_NOCTTY);  // a pipe without a writer is opened, not waited for
+  if (descriptor.is_open()) expect_regular(path, descriptor);
+  return descriptor;
+}
+
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit) {
-  const Descriptor descriptor = open_file(path, O_RDONLY);
+  const Descriptor descriptor = open_to_read(path);
   if (!descriptor.is_open()) fail(path, "cannot be read", errno);
   struct stat status {};
   if (::fstat(descriptor.get(), &status) != 0) fail(path, "cannot be read", errno);
@@ -120,7 +138,7 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t 
   const auto size = static_cast<std::size_t>(status.st_size);
   if (size > limit) refuse(size);
 
-  // The size is a hint only: pipes report 0, and a file may grow while it is read. With room for one byte more, the end is found without growing.
+  // The size is a hint only: files of the kernel report 0, and a file may grow while it is read. With room for one byte more, the end is found without growing.
   std::vector<std::byte> bytes(size + 1);
   std::size_t used = 0;
   for (;;) {
@@ -136,7 +154,7 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t 
 }
 
 std::optional<std::size_t> read_start(const std::filesystem::path& path, std::span<std::byte> bytes) {
-  Descriptor descriptor = open_file(path, O_RDONLY);
+  Descriptor descriptor = open_to_read(path);
   if (!descriptor.is_open()) return std::nullopt;
   std::size_t used = 0;
   while (used < bytes.size()) {

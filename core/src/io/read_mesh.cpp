@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/particle_files.h"
 
@@ -137,6 +138,7 @@ Mesh read_obj(std::string_view text, const std::string& path) {
   std::string joined;
   std::vector<std::uint32_t> corner;
   for (std::size_t first = 1; lines.next_joined(line, joined); first = lines.number() + 1) {
+    heed_scope();
     const std::string whole(line.substr(0, 60));
     const std::string place = path + ':' + std::to_string(first);
     line = line.substr(0, line.find('#'));
@@ -301,6 +303,7 @@ Mesh read_ply(std::string_view text, const std::string& path) {
   std::vector<std::uint32_t> corner;
   for (const PlyElement& element : elements) {
     for (std::size_t k = 0; k < element.count; ++k) {
+      heed_scope();
       Vec3 x = Vec3::Zero();
       for (const PlyProperty& property : element.properties) {
         if (!property.count) {
@@ -346,6 +349,7 @@ NumberTable read_ply_vertices(const std::filesystem::path& path) {
     }
     if (vertices) table.column.resize(table.name.size());
     for (std::size_t row = 0; row < element.count; ++row) {
+      heed_scope();
       std::size_t column = 0;
       for (const PlyProperty& property : element.properties) {
         const double length = property.count ? numbers.next(*property.count) : 1.0;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 
 namespace supple::implicit {
 namespace {
@@ -285,6 +286,7 @@ class Touching {
   [[nodiscard]] std::vector<std::uint8_t> find() const {
     std::vector<std::uint8_t> found(mesh_.triangle.size(), 0);
     for (std::uint32_t t = 0; t < found.size(); ++t) {
+      heed_scope();
       const Flat whole = flat(t);
       found[t] = !whole.normal.isZero() && any(t, whole) ? 1 : 0;
     }
@@ -337,6 +339,7 @@ class Boundary {
     });
     std::vector<std::optional<Place>> of_shell(count);
     for (std::uint32_t t = 0; t < count; ++t) {
+      heed_scope();
       const Flat whole = touching_.flat(t);
       if (whole.normal.isZero()) continue;  // its edges are those of others
       if (crosses[t] != 0) {

@@ -123,9 +123,9 @@ double ExactDistance::opposite_ball(const Vec3& on_surface, const Vec3& normal, 
   return cosine <= kOpposite ? radius : std::numeric_limits<double>::infinity();
 }
 
-double ExactDistance::thickness(double share) const {
+double ExactDistance::thickness(double share, double most) const {
   constexpr std::size_t kPlaces = 2000;
-  const double largest = 0.5 * box_.extent().minCoeff();
+  const double largest = 0.5 * std::min(most, box_.extent().minCoeff());
   std::vector<double> found;
   each_place(kPlaces, [&](const Vec3& at, const Vec3& normal) { found.push_back(2.0 * opposite_ball(at, normal, largest)); });
   if (found.empty()) return std::numeric_limits<double>::infinity();

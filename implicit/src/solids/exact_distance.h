@@ -9,6 +9,7 @@
 
 #include "solids/closed_surface.h"
 #include "solids/triangle_tree.h"
+#include "supple/core/interrupt.h"
 
 namespace supple::implicit {
 
@@ -29,8 +30,8 @@ class ExactDistance {
   /// nearly opposite, or that no larger one is looked for; else infinity (Ma, Bae & Choi 2012, "3D medial axis point approximation using nearest
   /// neighbors and the normal field").
   [[nodiscard]] double opposite_ball(const Vec3& on_surface, const Vec3& normal, double largest) const;
-  /// Thickness that all but a share of the area has at least, by such balls inside.
-  [[nodiscard]] double thickness(double share) const;
+  /// Thickness that all but a share of the area has at least, by such balls inside. @param most  is not told apart from more: larger balls see more triangles at once
+  [[nodiscard]] double thickness(double share, double most) const;
 
  private:
   void find_normals();
@@ -49,6 +50,7 @@ void ExactDistance::each_place(std::size_t count, const Use& use) const {
   for (std::uint32_t t = 0; t < surface_.triangle.size(); ++t) whole += area(t);
   std::size_t made = 0;
   for (std::uint32_t t = 0; t < surface_.triangle.size(); ++t) {
+    heed_scope();
     sum += area(t);
     // A number proportional to its area.
     for (; made < count && (static_cast<double>(made) + 0.5) * whole <= sum * static_cast<double>(count); ++made) {

@@ -1,9 +1,13 @@
 #include "solids/mesh_distance.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <type_traits>
 #include <utility>
+
+#include "supple/core/interrupt.h"
 
 namespace supple::implicit {
 namespace {
@@ -14,7 +18,9 @@ constexpr double kPoor = 0.75;        // cells that the spline may be off near t
 constexpr double kNear = 2.0;         // cells from the surface
 constexpr double kThin = 1.5;         // cells: of plates and gaps below it little is left
 constexpr double kMostPlaces = 1e6;   // that are tested on the surface
-constexpr std::size_t kBlock = 8;     // nodes along each side that one distance may prove to be far outside
+constexpr std::size_t kBlock = 8;     // nodes along each side that one distance may prove to be far from the surface
+constexpr std::size_t kSmallest = 2;  // of such blocks
+constexpr float kUnknown = std::numeric_limits<float>::lowest();  // not yet asked for
 
 /// Weights of the uniform cubic B-spline at t in [0, 1] for the nodes -1 .. 2, and their slopes.
 struct Weights {
@@ -62,27 +68,58 @@ void MeshDistance::lay_lattice() {
     size_[axis] = static_cast<std::size_t>(std::ceil(exact_.box().extent()[static_cast<Eigen::Index>(axis)] / cell_) + 2.0 * kMargin + 1.0);
   }
   unit_ = std::ldexp(1.0, std::ilogb(cell_));
-  distance_.assign(size_[0] * size_[1] * size_[2], static_cast<float>(kBand * cell_ / unit_));
+  distance_.assign(size_[0] * size_[1] * size_[2], kUnknown);
   weight_.assign(distance_.size(), 0);
   part_.assign(distance_.size(), Part::Spline);
+  known_.assign(distance_.size(), 0);
   for (std::size_t k = 0; k < size_[2]; k += kBlock) {
     for (std::size_t j = 0; j < size_[1]; j += kBlock) {
-      for (std::size_t i = 0; i < size_[0]; i += kBlock) fill(i, j, k);
+      heed_scope();
+      for (std::size_t i = 0; i < size_[0]; i += kBlock) search(i, j, k, kBlock);
     }
   }
 }
 
-/// The nodes of a block, unless all of them are beyond the band.
-void MeshDistance::fill(std::size_t i, std::size_t j, std::size_t k) {
-  const double half = 0.5 * static_cast<double>(kBlock - 1);
-  if (exact_.at(place_of(i, j, k) + Vec3::Constant(half * cell_), nullptr) > (kBand + std::sqrt(3.0) * half) * cell_) return;
-  for (std::size_t c = k; c < std::min(k + kBlock, size_[2]); ++c) {
-    for (std::size_t b = j; b < std::min(j + kBlock, size_[1]); ++b) {
-      for (std::size_t a = i; a < std::min(i + kBlock, size_[0]); ++a) {
-        distance_[node(a, b, c)] = static_cast<float>(std::min(exact_.at(place_of(a, b, c), nullptr), kBand * cell_) / unit_);
+/// Finds the nodes of a block that are near the surface, and those beyond the band. @param side  in nodes
+void MeshDistance::search(std::size_t i, std::size_t j, std::size_t k, std::size_t side) {
+  if (i >= size_[0] || j >= size_[1] || k >= size_[2]) return;
+  const double half = 0.5 * static_cast<double>(side - 1);
+  const double middle = exact_.at(place_of(i, j, k) + Vec3::Constant(half * cell_), nullptr) / cell_, reach = std::sqrt(3.0) * half;
+  const bool beyond = middle > kBand + reach;
+  if (!beyond && std::abs(middle) > kNear + reach) return;
+  if (!beyond && side > kSmallest) {
+    const std::size_t part = side / 2;
+    for (std::size_t n = 0; n < 8; ++n) search(i + (n & 1) * part, j + (n >> 1 & 1) * part, k + (n >> 2) * part, part);
+    return;
+  }
+  for (std::size_t c = k; c < std::min(k + side, size_[2]); ++c) {
+    for (std::size_t b = j; b < std::min(j + side, size_[1]); ++b) {
+      for (std::size_t a = i; a < std::min(i + side, size_[0]); ++a) {
+        if (beyond) distance_[node(a, b, c)] = static_cast<float>(kBand * cell_ / unit_);
+        else find(a, b, c);
       }
     }
   }
+}
+
+/// The distance at a node, unless it is known. Threads may find it at the same time: one of them keeps it, and nothing writes there any more.
+void MeshDistance::find(std::size_t i, std::size_t j, std::size_t k) const {
+  const std::atomic_ref<float> kept(distance_[node(i, j, k)]);
+  float before = kept.load(std::memory_order_acquire);
+  if (before != kUnknown) return;
+  kept.compare_exchange_strong(before, static_cast<float>(std::min(exact_.at(place_of(i, j, k), nullptr), kBand * cell_) / unit_), std::memory_order_acq_rel);
+}
+
+/// The distances that the spline in a cell takes.
+void MeshDistance::find_around(const Place& place) const {
+  const std::atomic_ref<std::uint8_t> known(known_[node(place.cell[0], place.cell[1], place.cell[2])]);
+  if (known.load(std::memory_order_acquire) != 0) return;
+  for (std::size_t c = 0; c < 4; ++c) {
+    for (std::size_t b = 0; b < 4; ++b) {
+      for (std::size_t a = 0; a < 4; ++a) find(place.cell[0] + a - 1, place.cell[1] + b - 1, place.cell[2] + c - 1);
+    }
+  }
+  known.store(1, std::memory_order_release);
 }
 
 MeshDistance::Place MeshDistance::cell_at(const Vec3& x) const {
@@ -127,11 +164,16 @@ double MeshDistance::spline(const std::vector<Number>& coefficient, const Place&
   return value * unit;
 }
 
+double MeshDistance::smoothed(const Place& place, Vec3* slope) const {
+  find_around(place);
+  return spline(distance_, place, slope);
+}
+
 double MeshDistance::at(const Vec3& x, Vec3* slope) const {
   const Place place = cell_at(x);
   const Part part = part_[node(place.cell[0], place.cell[1], place.cell[2])];
   if (part == Part::Exact) return exact_.at(x, slope);
-  const double smooth = spline(distance_, place, slope);
+  const double smooth = smoothed(place, slope);
   if (part == Part::Spline) return smooth;
   Vec3 exact_slope, rise;
   const double exact = exact_.at(x, slope != nullptr ? &exact_slope : nullptr), weight = spline(weight_, place, slope != nullptr ? &rise : nullptr);
@@ -149,26 +191,40 @@ double MeshDistance::steepest(const Box& box) const {
 /// Where the spline is off near the surface: at nodes, in the middles of cells, and at the vertices of the mesh.
 void MeshDistance::find_poor_cells() {
   for (const Vec3& x : exact_.surface().position) {
-    if (std::abs(spline(distance_, cell_at(x), nullptr)) > kPoor * cell_) keep_exact(x, 0);
+    if (std::abs(smoothed(cell_at(x), nullptr)) > kPoor * cell_) keep_exact(x, 0);
   }
   for (std::size_t k = 1; k + 2 < size_[2]; ++k) {
     for (std::size_t j = 1; j + 2 < size_[1]; ++j) {
+      heed_scope();
       for (std::size_t i = 1; i + 2 < size_[0]; ++i) {
         const double here = static_cast<double>(distance_[node(i, j, k)]) * unit_;
-        if (std::abs(here) > kNear * cell_) continue;
+        if (std::abs(here) > kNear * cell_) continue;  // also where it is not known
         const Vec3 at = place_of(i, j, k), middle = at + Vec3::Constant(0.5 * cell_);
-        if (std::abs(spline(distance_, cell_at(at), nullptr) - here) > kPoor * cell_) keep_exact(at, 1);
-        if (std::abs(spline(distance_, cell_at(middle), nullptr) - exact_.at(middle, nullptr)) > kPoor * cell_) keep_exact(middle, 0);
+        if (std::abs(smoothed(cell_at(at), nullptr) - here) > kPoor * cell_) keep_exact(at, 1);
+        if (may_be_poor(cell_at(middle)) && std::abs(smoothed(cell_at(middle), nullptr) - exact_.at(middle, nullptr)) > kPoor * cell_) keep_exact(middle, 0);
       }
     }
   }
+}
+
+/// Whether the spline in the middle of a cell may be off: the exact distance there differs from that of each corner by half a diagonal at most.
+bool MeshDistance::may_be_poor(const Place& middle) const {
+  constexpr double kSure = 1.0 - 1e-4;  // more than single precision loses
+  const double value = smoothed(middle, nullptr), half = 0.5 * std::sqrt(3.0) * cell_;
+  double least = kBand * cell_, most = -std::numeric_limits<double>::infinity();
+  for (std::size_t n = 0; n < 8; ++n) {
+    const double corner = unit_ * static_cast<double>(distance_[node(middle.cell[0] + (n & 1), middle.cell[1] + (n >> 1 & 1), middle.cell[2] + (n >> 2))]);
+    least = std::min(least, corner);
+    most = std::max(most, corner);
+  }
+  return std::max(least + half - value, value - most + half) > kPoor * kSure * cell_;
 }
 
 /// Where the solid or a gap is thin, and where the spline is off on the surface.
 void MeshDistance::find_thin_cells(std::size_t places) {
   exact_.each_place(places, [&](const Vec3& x, const Vec3& normal) {
     const double largest = 0.5 * kThin * cell_;
-    if (std::abs(spline(distance_, cell_at(x), nullptr)) > kPoor * cell_) keep_exact(x, 0);
+    if (std::abs(smoothed(cell_at(x), nullptr)) > kPoor * cell_) keep_exact(x, 0);
     if (std::min(exact_.opposite_ball(x, normal, largest), exact_.opposite_ball(x, -normal, largest)) < largest) keep_exact(x, 1);
   });
 }

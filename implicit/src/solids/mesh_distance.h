@@ -12,7 +12,7 @@ namespace supple::implicit {
 
 /// Distances d on a lattice are the coefficients of a cubic B-spline, which is C^2 and rounds edges over about a cell. Where its surface would be off by
 /// more than three quarters of a cell, or where the solid or a gap is thinner than a cell and a half, the exact distance takes its place, with a weight that is another
-/// such spline: 1 in all of those cells, 0 beyond their neighbours.
+/// such spline: 1 in all of those cells, 0 beyond their neighbours. Far from the surface a distance of the lattice is found when it is asked for first.
 class MeshDistance {
  public:
   explicit MeshDistance(ClosedSurface surface);
@@ -40,8 +40,12 @@ class MeshDistance {
   [[nodiscard]] Place cell_at(const Vec3& x) const;
   template <class Number>
   [[nodiscard]] double spline(const std::vector<Number>& coefficient, const Place& place, Vec3* slope) const;
+  [[nodiscard]] double smoothed(const Place& place, Vec3* slope) const;
   void lay_lattice();
-  void fill(std::size_t i, std::size_t j, std::size_t k);
+  void search(std::size_t i, std::size_t j, std::size_t k, std::size_t side);
+  void find(std::size_t i, std::size_t j, std::size_t k) const;
+  void find_around(const Place& place) const;
+  [[nodiscard]] bool may_be_poor(const Place& middle) const;
   void find_poor_cells();
   void find_thin_cells(std::size_t places);
   void keep_exact(const Vec3& x, int beyond);
@@ -52,7 +56,8 @@ class MeshDistance {
   double cell_ = 0.0;
   std::array<std::size_t, 3> size_{};
   double unit_ = 1.0;                 // the power of two below `cell_`, so that floats hold distances of any size [m]
-  std::vector<float> distance_;       // at the nodes, x fastest, over `unit_`
+  mutable std::vector<float> distance_;      // at the nodes, x fastest, over `unit_`
+  mutable std::vector<std::uint8_t> known_;  // whether all distances are that the spline in the cell above each node takes
   std::vector<std::uint8_t> weight_;  // of the exact distance, at the nodes
   std::vector<Part> part_;            // of the cell above each node
   Box exact_box_;                     // of the cells where the exact distance has a part

@@ -44,7 +44,8 @@ MeshSolid::MeshSolid(const Mesh& mesh, const MeshSolidOptions& options)
   constexpr double kThinner = 0.01, kPart = 1.0 / 16.0;  // share of the area; of the longest side
   const Vec3 extent = distance_->exact().box().extent();
   deepest_ = -distance_->range().lower;
-  feature_size_ = std::min(distance_->exact().thickness(kThinner), kPart * extent.maxCoeff());
+  const double most = kPart * extent.maxCoeff();
+  feature_size_ = std::min(distance_->exact().thickness(kThinner, most), most);
   report_ = {surface.turned, surface.crossing_before, surface.deviation + distance_->deviation(), extent.maxCoeff()};
 }
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 
 namespace supple::implicit {
 namespace {
@@ -59,6 +60,7 @@ TriangleTree::TriangleTree(std::span<const Vec3> position, std::span<const std::
 
 /// Parts faces at medians along the longest side of their middles. @param first  place of the first of them in `face_`   @return the new node
 std::uint32_t TriangleTree::build(std::span<std::uint32_t> faces, std::uint32_t first, std::span<const Face> given) {
+  heed_scope();
   const auto middle = [&](std::uint32_t t) -> Vec3 { return (given[t].corner[0] + given[t].corner[1] + given[t].corner[2]) / 3.0; };
   const auto halve = [&](std::size_t begin, std::size_t end) {
     if (end - begin <= kWide) return end;

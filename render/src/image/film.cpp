@@ -1,5 +1,6 @@
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -92,6 +93,7 @@ std::string number_text(double value) {
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
+constexpr std::uintmax_t kLargestFacts = std::uintmax_t{1} << 26;  // [byte]; a million pictures take half of it
 constexpr std::string_view kPictures = "pictures ";
 constexpr std::string_view kNote = "; note ";
 
@@ -112,11 +114,11 @@ std::string identity_of(const std::vector<std::string>& arguments, const std::ve
 std::string facts_of(const std::filesystem::path& film) {
   std::error_code absent;
   const std::uintmax_t length = std::filesystem::file_size(film, absent);
-  if (absent) return {};
+  if (absent) return {};  // or no regular file
   std::ifstream in(film, std::ios::binary);
   for (std::array<unsigned char, 8> head{}; in.read(reinterpret_cast<char*>(head.data()), head.size());) {
     const std::size_t size = std::size_t{head[0]} << 24 | std::size_t{head[1]} << 16 | std::size_t{head[2]} << 8 | std::size_t{head[3]};
-    if (size < head.size() || size > length) return {};
+    if (size < head.size() || size > std::min(length, kLargestFacts)) return {};
     const std::string_view kind(reinterpret_cast<const char*>(&head[4]), 4);
     if (kind == "mdat") return {};  // the facts come first in films of `encode_film`
     std::string box(size - head.size(), '\0');

@@ -1,6 +1,5 @@
 #include "file/named_files.h"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -32,7 +31,7 @@ std::string content_text(const fs::path& path) {
   if (path.empty()) return "absent";
   std::error_code status;
   if (fs::file_size(path, status) > io::kLargestInput) return "too large";
-  const io::Descriptor file = io::open_file(path, O_RDONLY);
+  const io::Descriptor file = io::open_to_read(path);
   std::string part(std::size_t{1} << 20, '\0');  // bytes in memory at a time
   Hasher hasher;
   for (bool whole = false; !whole;) {

@@ -326,7 +326,7 @@ std::string setting(const SceneKey* other, const SceneKey* here) {
   std::string value = other != nullptr ? other->value : here->fallback;
   if (path.starts_with("pairs(") || value == kNone || value == "absent" || value.starts_with("content ")) return {};
   if (value == kGiven) {
-    if (other->fallback != "false") return {};  // an item of a list
+    if (other == nullptr || other->fallback != "false") return {};  // an item of a list, or a damaged state
     value = "{}";
   }
   const std::string word = path + '=' + value;
@@ -372,7 +372,8 @@ SceneKeys keys_in(std::string_view text) {
   SceneKeys keys;
   while (!text.empty()) {
     const std::size_t end = text.find('\n'), first = text.find('\t'), second = text.find('\t', first + 1);
-    if (end == std::string_view::npos || first >= end || second >= end) {
+    const bool whole = end != std::string_view::npos && first < end && second < end;
+    if (!whole || (!keys.empty() && text.substr(0, first) < keys.back().path)) {  // they are looked up by halving
       throw Error(ErrorKind::Corrupt, Fault{.expected = "expected keys of a scene in the saved state"});
     }
     keys.push_back({std::string(text.substr(0, first)), std::string(text.substr(first + 1, second - first - 1)),

@@ -12,6 +12,7 @@
 #include "model/model_volume.h"
 #include "supple/core/arrange.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/implicit/convolution.h"
 
 namespace supple::scenes {
@@ -113,6 +114,7 @@ Mat3 second_moments(const implicit::Skeleton& solid, const Quat& turn, int cells
     sum.setZero();
     inside = 0.0;
     for (int k = 0; k < cells; ++k) {
+      heed_scope();
       point.clear();
       for (int j = 0; j < cells; ++j) {
         for (int i = 0; i < cells; ++i) point.emplace_back(box.lower + cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5)));

@@ -69,7 +69,7 @@ void expect_same_look(const fs::path& folder, const PictureLook& own, const Pict
 
 }  // namespace
 
-LockFile::LockFile(const fs::path& folder) : path_(folder / kLockName), file_(io::open_file(path_, O_RDWR | O_CREAT, 0644)) {
+LockFile::LockFile(const fs::path& folder) : path_(folder / kLockName), file_(io::open_file(path_, O_RDWR | O_CREAT | O_NOFOLLOW, 0644)) {
   if (!file_.is_open()) {
     refuse(path_, "expected a file that can be written", std::system_category().message(errno),
            "it holds the folder for one run; remove it, or choose another --out");

@@ -216,8 +216,11 @@ RunResult guarded(const Scene& scene, const RunOptions& options, const char* rep
     }
   }
   // A report of an earlier run stays if nothing was done.
-  const bool refused = result.exit_code != 0 && result.frames == 0 && fs::exists(result.report);
-  if (!refused) write_result_file(scene, result, simulation ? &*simulation : nullptr, {seconds_since(begin), process_cpu_seconds() - cpu_before});
+  if (result.exit_code != 0 && result.frames == 0 && fs::exists(result.report)) {
+    result.report.clear();
+  } else {
+    write_result_file(scene, result, simulation ? &*simulation : nullptr, {seconds_since(begin), process_cpu_seconds() - cpu_before});
+  }
   return result;
 }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
@@ -95,6 +97,17 @@ TEST_F(Files, StartsAreReadOfFilesThatMayBeAbsentAlone) {
   EXPECT_EQ(io::read_start_if_there(path("short") / "below", start), 0U);
   // A folder opens and cannot be read, as a file on a failing disk.
   expect_error(ErrorKind::Io, "Is a directory", [&] { static_cast<void>(io::read_start_if_there(path("."), start)); });
+}
+
+TEST_F(Files, ThatAreReadAreRegularOnes) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  fs::create_symlink("/dev/zero", path("device"));
+  std::array<std::byte, 8> start{};
+  for (const auto& [name, found] : {std::pair{"pipe", "expected a regular file, found a pipe"}, {"device", "expected a regular file, found a device or a socket"}}) {
+    expect_error(ErrorKind::Io, found, [&] { (void)io::read_file(path(name), 100); });
+    expect_error(ErrorKind::Io, found, [&] { (void)io::read_start(path(name), start); });
+    expect_error(ErrorKind::Io, found, [&] { (void)io::read_start_if_there(path(name), start); });
+  }
 }
 
 TEST_F(Files, FoldersAreMadeOrRefused) {

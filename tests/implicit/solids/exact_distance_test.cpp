@@ -72,6 +72,8 @@ double distance_to(const Mesh& mesh, const Vec3& x) {
   return least;
 }
 
+constexpr double kAny = std::numeric_limits<double>::infinity();  // thickness
+
 TEST(ExactDistance, IsTheBoxThatItsTrianglesBound) {
   // However thin: all of it is exact but for rounding of coordinates below 2.
   for (const double thickness : {0.4, 0.02, 1e-3, 1e-6}) {
@@ -80,7 +82,9 @@ TEST(ExactDistance, IsTheBoxThatItsTrianglesBound) {
       const ExactSolid solid(block(half, Vec3::Zero(), turned), {.slope = 3.0, .pose = {at, kTurn}});
       const SolidBox box({at, kTurn}, half, 0.0, 3.0);
       EXPECT_EQ(solid.surface().deviation, 0.0);
-      EXPECT_NEAR(solid.distance().thickness(0.01), thickness, 1e-9);
+      EXPECT_NEAR(solid.distance().thickness(0.01, kAny), thickness, 1e-9);
+      EXPECT_NEAR(solid.distance().thickness(0.01, 2.0 * thickness), thickness, 1e-9);
+      EXPECT_NEAR(solid.distance().thickness(0.01, 0.5 * thickness), 0.5 * thickness, 1e-9);
       std::vector<Vec3> all = places({Vec3(-0.8, -0.7, -0.4), Vec3(0.8, 0.7, 0.4)}, 500);
       for (const Vec3& x : places({-1.1 * half, 1.1 * half}, 500)) all.push_back(x);
       for (const Vec3& local : all) {
@@ -160,7 +164,7 @@ TEST(ExactDistance, HasTheCavityThatAShellTheOtherWayRoundBounds) {
   for (const bool inside_out : {false, true}) {
     const ExactSolid hollow(both(block(outer, Vec3::Zero(), inside_out), block(inner, at, !inside_out)), {.slope = 1.0});
     // The wall beside the cavity is 0.15 thick, the one below it 0.2, that above 0.4.
-    EXPECT_NEAR(hollow.distance().thickness(0.001), 0.15, 1e-9);
+    EXPECT_NEAR(hollow.distance().thickness(0.001, kAny), 0.15, 1e-9);
     for (const Vec3& x : all) {
       // Both distances are exact in the wall and in the cavity, and outside the box is nearer.
       const double expected = std::min(FieldView(whole).value(x), -FieldView(hole).value(x));

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include "solids/exact_distance.h"
 #include "supple/core/error.h"
@@ -56,6 +58,23 @@ TEST(MeshSolid, IsTheSameInAnyUnitOfLength) {
       EXPECT_EQ(value(scaled, scale * u), scale * value(solid, u)) << power;
     }
   }
+}
+
+TEST(MeshSolid, IsTheSameInAnyOrderOfQuestionsByAnyThreads) {
+  const Mesh mesh = gear(24, 0.4, 0.5, 0.1);
+  const std::vector<Vec3> asked = places({Vec3::Constant(-0.6), Vec3::Constant(0.6)}, 2000);
+  const MeshSolid solid(mesh, {.slope = 1.0}), other(mesh, {.slope = 1.0});
+  std::vector<double> expected;
+  for (const Vec3& x : asked) expected.push_back(value(solid, x));
+  std::vector<std::vector<double>> found(4, std::vector<double>(asked.size()));
+  std::vector<std::thread> threads;
+  for (std::vector<double>& own : found) {
+    threads.emplace_back([&] {
+      for (std::size_t k = asked.size(); k-- > 0;) own[k] = value(other, asked[k]);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const std::vector<double>& own : found) EXPECT_EQ(own, expected);
 }
 
 TEST(MeshSolid, IsExactBesideFlatFaces) {

@@ -92,7 +92,7 @@ struct RunResult {
   int frames_at_once = 1;   ///< frames that were in work at the same time
   int pictures_kept = 0;    ///< pictures of `render_run` that existed already and show this scene and state
   bool film_is_left = false; ///< frames are absent, and other processes that still draw make film and sheet
-  std::filesystem::path report; ///< result.json, render.json or export.json
+  std::filesystem::path report; ///< result.json, render.json or export.json; empty where nothing was done and that of an earlier run stays
   std::filesystem::path film;   ///< empty: none
   std::vector<std::string> warnings;
   SearchCounts searches;    ///< counts of the meshes of all frames, kept ones included

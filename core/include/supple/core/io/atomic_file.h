@@ -51,10 +51,13 @@ inline constexpr std::size_t kLargestInput = std::size_t{1} << 29;
 /// Renames a file that another program wrote to its final name, after fsync. @throws Error{Io}; it keeps its first name then.
 void rename_whole(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// The whole file. @throws Error{Io} when it cannot be read, Error{Limit} when it is larger than `limit` bytes.
+/// Opens a file for reading. None, with errno, where that fails. @throws Error{Io} for pipes, devices and sockets, whose reading may never end
+[[nodiscard]] Descriptor open_to_read(const std::filesystem::path& path);
+
+/// The whole file. @throws Error{Io} when it cannot be read or is none of the regular ones, Error{Limit} when it is larger than `limit` bytes.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit);
 
-/// Fills `bytes` with the start of a file. @return number of bytes; none, with errno, where it cannot be read
+/// Fills `bytes` with the start of a file. @return number of bytes; none, with errno, where it cannot be read @throws as `open_to_read`
 [[nodiscard]] std::optional<std::size_t> read_start(const std::filesystem::path& path, std::span<std::byte> bytes);
 /// The same of a file that may be absent, which has none. @throws Error{Io} where it is there and cannot be read
 [[nodiscard]] std::size_t read_start_if_there(const std::filesystem::path& path, std::span<std::byte> bytes);
