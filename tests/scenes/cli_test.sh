@@ -155,8 +155,8 @@ for folder in out nothing_read; do
   [[ ! -e $folder ]] || { echo "$folder: expected nothing, found a folder"; failures=$((failures + 1)); }
 done
 
-printf 'x' >> good/states/good.0002.state
-expect 7 'checksum' query forces good.yaml --state good/states/good.0002.state
+mkdir -p damaged && cp good/states/good.0002.state damaged && printf 'x' >> damaged/good.0002.state
+expect 7 'checksum' query forces good.yaml --state damaged/good.0002.state
 
 mkdir -p loop unlocked/.lock && ln -s frames loop/frames
 expect 4 'loop/frames' run good.yaml --out loop --progress none
