@@ -24,7 +24,7 @@ class Contacts(unittest.TestCase):
         self.assertEqual([(pair.a, pair.b) for pair in pressed().contacts()], [("left", "right")])
 
     def test_add_up(self):
-        contacts = pressed().contacts()
+        contacts = pressed(["contact.error=1e-4"]).contacts()
         pair = contacts[-1]
         self.assertEqual(pair.point.shape, pair.normal.shape)
         self.assertEqual((len(pair.point_area), len(pair.pressure)), (len(pair.point),) * 2)
@@ -39,7 +39,7 @@ class Contacts(unittest.TestCase):
         np.testing.assert_allclose(contacts.force, [pair.force, -pair.force], rtol=1e-12, atol=1e-14)
         np.testing.assert_array_equal(contacts.pair, 0)
         self.assertEqual(contacts.energy, pair.energy)
-        self.assertLessEqual(pair.error_estimate, 1e-2)  # contact.error of the default accuracy
+        self.assertLessEqual(pair.error_estimate, 1e-4)
         self.assertEqual(pair.rule, "polar")
 
     def test_stay_as_they_were(self):

@@ -1,6 +1,6 @@
 /// @file stage_errors.h
 /// Estimates the error of positions that each stage of a run causes. A sample of the frames with contact, and one of those without, is simulated again from
-/// the state before: with steps twice as long (half as long where a frame is one step) and, with `accuracy`, with a tenth of contact.error.
+/// the state before: with steps twice as long (half as long where a frame is one step) and, of scenes with an accuracy, given or by default, with a tenth of contact.error.
 #pragma once
 
 #include <array>
