@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numeric>
 
 #include "mesh/partition/polygonise_blocks.h"
@@ -16,6 +17,7 @@ constexpr std::size_t kBoxesPerTask = 32;
 constexpr std::size_t kMostCubes = 8192;  // of a level that is refined at once
 constexpr std::size_t kSamples = 8, kSampled = 128;  // of a level with more, and the cubes of each
 constexpr double kSpreads = 6.0, kFarTooMany = 1.25;  // below their mean, samples leave no doubt; of the limit
+constexpr double kHopeless = 1000.0;                  // times the limit: two samples that both count so many leave no doubt either
 constexpr double kLargestNode = 1 << 30;
 
 /// A cube of 2^level blocks, in units of its own size, with its candidates.
@@ -156,11 +158,13 @@ class Refinement {
   /// Refuses counts far above the limit early, by samples of a level whose cubes were processed; their spread measures their quality.
   void expect_not_far_too_many(const LevelPart& level, int size) const {
     const std::size_t stride = odd(level.cube.size() / kSampled + 1);
-    double sum = 0.0, squares = 0.0;
+    double sum = 0.0, squares = 0.0, least = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < kSamples; ++k) {
       const double blocks = static_cast<double>(stride) * sampled_blocks(every(level, k * stride / kSamples, stride), size, k);
       sum += blocks;
       squares += blocks * blocks;
+      least = std::min(least, blocks);
+      if (k == 1 && least > kHopeless * static_cast<double>(options_.limit)) refuse(sum / 2.0);
     }
     constexpr auto n = static_cast<double>(kSamples);
     const double mean = sum / n, spread = std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1.0));
