@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "neighbours/cell_search.h"
+#include "particles/random_share.h"
 #include "supple/core/error.h"
-#include "supple/core/hash.h"
 #include "supple/core/math.h"
 #include "supple/core/neighbours.h"
 
@@ -99,12 +99,7 @@ void disorder(Arrangement& arrangement, double distance) {
     Vec3 way;
     std::uint64_t draw = 0;
     do {  // the first point of a cube that lies in the ball
-      for (int k = 0; k < 3; ++k) {
-        Hasher hasher;
-        hasher.add(i);
-        hasher.add(draw++);
-        way[k] = 2.0 * static_cast<double>(hasher.value() >> 11) * 0x1p-53 - 1.0;
-      }
+      for (int k = 0; k < 3; ++k) way[k] = 2.0 * random_share(i, draw++) - 1.0;
     } while (way.squaredNorm() > 1.0);
     arrangement.position[i] += distance * way;
   }

@@ -6,9 +6,9 @@
 #include <numbers>
 #include <tuple>
 
+#include "particles/random_share.h"
 #include "supple/core/arrange.h"
 #include "supple/core/error.h"
-#include "supple/core/hash.h"
 #include "supple/core/math.h"
 
 namespace supple::core {
@@ -16,14 +16,6 @@ namespace {
 
 constexpr int kTriesOfPoint = 100;     // of a scattered particle
 constexpr int kChordsOfPiece = 256;    // of a curve between two points, for its length
-
-/// Uniform in [0, 1), by seed and number of the draw alone.
-double random_share(int seed, std::uint64_t draw) {
-  Hasher hasher;
-  hasher.add(static_cast<std::uint64_t>(seed));
-  hasher.add(draw);
-  return static_cast<double>(hasher.value() >> 11) * 0x1p-53;
-}
 
 Quat frame_of(const Vec3& x, const Vec3& z) {
   Mat3 axes;
@@ -147,7 +139,7 @@ Arrangement arrange_scatter(const Vec3& size, int count, double apart, int seed)
   const std::uint64_t most = static_cast<std::uint64_t>(kTriesOfPoint) * static_cast<std::uint64_t>(count);
   for (std::uint64_t attempt = 0; attempt < most && out.size() < static_cast<std::size_t>(count); ++attempt) {
     Vec3 x;
-    for (Eigen::Index axis = 0; axis < 3; ++axis) x[axis] = size[axis] * (random_share(seed, 3 * attempt + static_cast<std::uint64_t>(axis)) - 0.5);
+    for (Eigen::Index axis = 0; axis < 3; ++axis) x[axis] = size[axis] * (random_share(static_cast<std::uint64_t>(seed), 3 * attempt + static_cast<std::uint64_t>(axis)) - 0.5);
     if (!is_free(x)) continue;
     taken.emplace(Cell{number(x.x()), number(x.y()), number(x.z())}, out.size());
     out.position.push_back(x);
