@@ -28,11 +28,9 @@ struct SlowSlip {
   double share = 1e-3;
 };
 
-/// How friction enters the matrix. Both have the gradient of the potential; the majorant (of the weights of iteratively reweighted least squares) bounds it from
-/// above, so that its corrections need no line search, and Newton's own is the faster one near the minimum.
-enum class FrictionHessian : std::uint8_t { Exact, Majorant };
-
 /// The contact points of one step. Order of calls: `begin`; then `lag_friction` and the others at any poses; `finish`.
+/// Friction is a sum of norms of slips, mollified at speeds far below the visible, where Newton's own corrections would be cut short. Its directions are unknowns of
+/// their own, eliminated from the matrix, and lag behind the slips by one correction at most (primal-dual method of Chan, Golub and Mulet 1999).
 class ContactTerm {
  public:
   /// @param predicted  the pose of `points`  @param start  at the begin of the step
@@ -48,19 +46,29 @@ class ContactTerm {
   /// Adds the gradient in (displacement, rotation) of each particle, the rotation applied from the left, world axes.
   void add_gradient(const ParticleState& pose, Eigen::VectorXd& gradient);
   /// Adds the positive semi-definite Hessian at the pose. @param first_pair  index of `coupled()[0]` in the list of the matrix
-  void add_hessian(const ParticleState& pose, std::size_t first_pair, FrictionHessian friction, StepHessian& hessian);
-  /// Largest displacement of a point of a sliding or sticking pair by a correction, over what sticks within a step [1].
-  [[nodiscard]] double stick_ratio(const Eigen::VectorXd& correction) const;
+  void add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian);
+  /// Directions of friction after this correction of the pose of the last `add_hessian`. @return the largest change of a slip [m/s]
+  double predict_friction(const Eigen::VectorXd& correction);
+  /// Goes this share of the way to the predicted directions.
+  void turn_friction(double share);
 
   /// Adds the loads on particles at the pose; books what obstacles get and do, and what damping and friction take over `dt`.
   void finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger, std::vector<ContactPairLoad>& pairs);
 
  private:
-  struct Traction {
-    Vec3 force = Vec3::Zero();       ///< on A, of pressure alone, without damping [N]
-    Vec3 dissipative = Vec3::Zero();  ///< on A [N]
+  /// Points of one pair with the same particles and shares, which move as one rigid body.
+  struct Group {
+    std::uint32_t begin = 0, end = 0;              ///< points
+    std::uint32_t entry_begin = 0, entry_end = 0;  ///< particles and shares of all of them
+    std::uint32_t block = 0;                       ///< of its first pair of entries
+    std::uint32_t pair = 0;
+    Vec3 origin = Vec3::Zero();                    ///< its first point [m]
+    double friction = 0.0;                         ///< coefficient [1]
+    double damping = 0.0;                          ///< dissipation over the step [1/m]
+    double slow = 0.0;                             ///< speed below which friction fades out [m/s]
   };
   void find_touched();
+  void find_groups();
   void find_stick_speeds(const SlowSlip& slow);
   void find_coupled();
   /// Sums of pressures, without damping, over those at the predicted pose, by pair.
@@ -68,16 +76,17 @@ class ContactTerm {
   /// Moves touched particles and points to the pose; does nothing where they are there.
   void place(const ParticleState& pose);
   [[nodiscard]] bool is_at(const ParticleState& pose) const;
-  [[nodiscard]] Vec3 displacement_of(std::size_t q) const;
-  /// Adds a stiffness about one origin, its lower left block left out, of points with the entries of point q, to the blocks of its particles. @param block  of the first pair of entries
-  void spread(std::size_t q, std::size_t block, const Mat6& stiffness);
-  [[nodiscard]] Vec3 slip(std::size_t q, const Vec3& u) const;
-  [[nodiscard]] double normal_force(std::size_t q, double approach) const;
-  [[nodiscard]] double normal_potential(std::size_t q, double approach) const;
-  [[nodiscard]] double normal_stiffness(std::size_t q, double approach) const;
-  [[nodiscard]] Vec3 gradient_of(std::size_t q, const Vec3& u) const;
-  [[nodiscard]] Mat3 hessian_of(std::size_t q, const Vec3& u, FrictionHessian friction) const;
-  [[nodiscard]] Traction traction_of(std::size_t q, const Vec3& u) const;
+  /// Sign of an obstacle's velocity in that of A relative to B; 0: none.
+  [[nodiscard]] double leads(const Group& group) const;
+  /// Adds a stiffness about one origin of a group's points.
+  void spread(const Group& group, const Mat6& stiffness);
+  [[nodiscard]] double normal_force(const Group& group, std::size_t q) const;
+  [[nodiscard]] double elastic_force(std::size_t q) const;  ///< without damping
+  [[nodiscard]] double normal_potential(const Group& group, std::size_t q) const;
+  [[nodiscard]] double normal_stiffness(const Group& group, std::size_t q) const;
+  [[nodiscard]] Vec3 gradient_of(const Group& group, std::size_t q) const;
+  /// Stiffness of a group against displacement and rotation about `origin`.
+  [[nodiscard]] Mat6 hessian_of(const Group& group, const Vec3& origin) const;
 
   const ContactPoints* points_ = nullptr;
   const ParticleState* start_ = nullptr;
@@ -85,20 +94,24 @@ class ContactTerm {
   std::vector<double> stick_speed_;      // below which friction fades out, by pair [m/s]
   std::vector<std::uint32_t> touched_;   // particles, ascending
   std::vector<std::uint32_t> entry_;     // index into `touched_`, by entry of the rows
-  std::vector<Vec3> arm_;                // X - x_k at the predicted pose, by entry
+  std::vector<Group> groups_;
+  std::vector<Vec3> arm_;                // from the centres of its particles to a group's origin at the predicted pose, by entry of the group
+  std::vector<Vec3> local_;              // from its group's origin, by point
   std::vector<double> offset_pressure_;  // p - g u_p . n [Pa], by point
   std::vector<Vec3> start_velocity_;     // relative, at the begin, by point [m/s]
   std::vector<double> lagged_;           // normal force, by point [N]
+  std::vector<Vec3> direction_, next_direction_;  // friction over its largest value, by point: dual variables [1]
   std::vector<std::uint32_t> split_entry_;  // index into `touched_`, of each load within bodies
   std::vector<Vec3> split_place_;        // centre of its particle at the predicted pose [m]
   std::vector<double> split_scale_;      // by pair, lagged [1]
-  std::vector<std::uint32_t> pair_of_;   // by point
   std::vector<Pose> placed_;             // of the touched particles, at the last call of `place`
   std::vector<Vec3> moved_, turned_;     // since the start, by touched particle [m], [rad]
   std::vector<Vec3> displacement_;       // of A relative to B since the start, by point [m]
-  std::vector<std::uint8_t> as_last_;    // by point: its particles and their shares are those of the point before it
+  std::vector<double> approach_;         // its part along the normal [m]
+  std::vector<Vec3> slip_;               // velocity across the normal [m/s]
+  std::vector<double> speed_;            // of the slip [m/s]
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coupled_;
-  std::vector<std::uint32_t> block_;     // of each pair of entries of each row, in order: into `coupled_`, or touched particle on the diagonal
+  std::vector<std::uint32_t> block_;     // of each pair of entries of each group, in order: into `coupled_`, or touched particle on the diagonal
   std::vector<Mat6> diagonal_, off_diagonal_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "integrate/step.h"
 #include "laws/damping.h"
@@ -66,28 +67,24 @@ class StepPotential {
     }
   }
 
-  /// The same with the factor of the last `solve`. @return false: it has none
-  bool refine() {
-    if (!factorised_) return false;
-    buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
-    return true;
+  /// Largest change of velocity by the forces that the last `differentiate` left over, turns at a distance of `length` [m/s].
+  [[nodiscard]] double residual_speed(double length) const {
+    double largest2 = 0.0;
+    for (std::size_t i = 0; i < set_.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(6 * i);
+      const double speed2 = (1.0 / set_.mass[i] * buffers_.gradient.segment<3>(row)).squaredNorm();
+      const double spin2 = (buffers_.pose.orientation[i].conjugate() * Vec3(buffers_.gradient.segment<3>(row + 3))).cwiseQuotient(set_.inertia[i]).squaredNorm();
+      largest2 = std::max({largest2, speed2, length * length * spin2});
+    }
+    return h_ * std::sqrt(largest2);
   }
 
   /// Solves H correction = -gradient. The exact Hessian is taken where it is positive definite.
-  void solve(const IntegratorSettings& settings, const ParticleState& pose, FrictionHessian friction, StepReport& report) {
+  void solve(const IntegratorSettings& settings, const ParticleState& pose, StepReport& report) {
     const bool direct = 6 * set_.size() <= static_cast<std::size_t>(settings.direct_unknowns);
-    factorised_ = false;
-    if (direct) {
-      assemble(pose, HessianKind::Exact, friction);
-      factorised_ = buffers_.solver.factorise(buffers_.hessian);
-      if (factorised_) {
-        buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
-        return;
-      }
-    }
-    assemble(pose, HessianKind::PositiveSemiDefinite, friction);
-    factorised_ = direct && buffers_.solver.factorise(buffers_.hessian);
-    if (factorised_) {
+    for (const HessianKind kind : {HessianKind::Exact, HessianKind::PositiveSemiDefinite}) {
+      if (kind == HessianKind::PositiveSemiDefinite || direct) assemble(pose, kind);
+      if (!direct || !buffers_.solver.factorise(buffers_.hessian)) continue;
       buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
       return;
     }
@@ -101,7 +98,7 @@ class StepPotential {
   }
 
  private:
-  void assemble(const ParticleState& pose, HessianKind kind, FrictionHessian friction) {
+  void assemble(const ParticleState& pose, HessianKind kind) {
     buffers_.bonded.clear();
     buffers_.blocks.clear();
     for_each_hessian(set_, pose, interactions_, kind, [this](std::uint32_t a, std::uint32_t b, const PairHessian& h) {
@@ -122,7 +119,7 @@ class StepPotential {
     }
     for (std::size_t k = 0; k < buffers_.blocks.size(); ++k) buffers_.hessian.add_pair(k, buffers_.blocks[k]);
     buffers_.damping.add_hessian(pose, buffers_.blocks.size(), buffers_.hessian);
-    buffers_.contact.add_hessian(pose, buffers_.blocks.size() + damped.size(), friction, buffers_.hessian);
+    buffers_.contact.add_hessian(pose, buffers_.blocks.size() + damped.size(), buffers_.hessian);
   }
 
   const ParticleSet& set_;
@@ -131,7 +128,6 @@ class StepPotential {
   double h_;
   InteractionWorkspace& pairs_;
   ImplicitBuffers& buffers_;
-  bool factorised_ = false;  ///< the matrix of the last `solve`
 };
 
 /// Size of a correction: positions over `length`, angles in radians.
@@ -154,6 +150,19 @@ double largest_angle(const Eigen::VectorXd& correction) {
   return std::sqrt(largest2);
 }
 
+/// Whether a correction is lost in the rounding of the pose.
+bool is_rounding(const Eigen::VectorXd& correction, const ParticleState& pose) {
+  constexpr double kRounding = 2.0 * std::numeric_limits<double>::epsilon();
+  double far = 0.0, moved = 0.0, turned = 0.0;
+  for (std::size_t i = 0; i < pose.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(6 * i);
+    far = std::max(far, pose.position[i].cwiseAbs().maxCoeff());
+    moved = std::max(moved, correction.segment<3>(row).cwiseAbs().maxCoeff());
+    turned = std::max(turned, correction.segment<3>(row + 3).cwiseAbs().maxCoeff());
+  }
+  return moved <= kRounding * far && turned <= kRounding;
+}
+
 void move(const ParticleState& pose, const Eigen::VectorXd& correction, double share, ParticleState& out) {
   for (std::size_t i = 0; i < pose.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(6 * i);
@@ -165,7 +174,8 @@ void move(const ParticleState& pose, const Eigen::VectorXd& correction, double s
 }
 
 /// Newton's method from `buffers.pose`, which ends at the minimum; `buffers.laws` are the loads there.
-void minimise(const IntegratorSettings& settings, StepPotential& potential, ImplicitBuffers& buffers,
+/// @param speed_error  of particles that touch something, by the forces that are left [m/s]
+void minimise(const IntegratorSettings& settings, double speed_error, StepPotential& potential, ImplicitBuffers& buffers,
               StepReport& report) {
   constexpr double kDescent = 1e-4;      // Armijo's share of the descent that the gradient promises
   constexpr double kRoundOff = 1e-14;    // of the potential
@@ -173,35 +183,32 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
   constexpr int kMostHalvings = 30;
   constexpr int kMostLags = 8;           // times that friction follows the normal forces
   constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
-  constexpr double kStuck = 1e-3;       // of the stick speed: largest change of a slip by the last correction
   report.within_tolerance = false;
   double value = 0.0;
   int lags = 0;
-  FrictionHessian friction = FrictionHessian::Majorant;
   const auto begin_at_pose = [&] {
-    if (lags < kMostLags && buffers.contact.lag_friction(buffers.pose) > kLagged) {
-      ++lags;
-    } else {
-      lags = kMostLags;
+    if (lags < kMostLags) {
+      lags = buffers.contact.lag_friction(buffers.pose) > kLagged ? lags + 1 : kMostLags;
+      value = potential.value(buffers.pose);  // of the friction that follows the normal forces
     }
     potential.differentiate(buffers.pose);
   };
   begin_at_pose();
   for (int iteration = 0; iteration < settings.max_iterations; ++iteration) {
-    if (iteration == 0 || !buffers.contact.empty()) value = potential.value(buffers.pose);
     if ((buffers.gradient.array() == 0.0).all()) {
       report.last_correction = 0.0;
       report.within_tolerance = true;
       return;
     }
-    potential.solve(settings, buffers.pose, friction, report);
+    potential.solve(settings, buffers.pose, report);
     ++report.newton_iterations;
     report.last_correction = size_of(buffers.correction, settings.length);
     if (!std::isfinite(report.last_correction)) return;
 
-    // A correction within the tolerance is the last one. Its gain may be less than the potential's rounding errors.
-    const bool newton = friction == FrictionHessian::Exact || buffers.contact.empty();  // what a majorant leaves is no square of its correction
-    const bool last = newton && report.last_correction <= settings.tolerance && buffers.contact.stick_ratio(buffers.correction) <= kStuck;
+    // The gain of a small correction may be less than the potential's rounding errors.
+    const double slips = buffers.contact.predict_friction(buffers.correction);
+    const bool small = report.last_correction <= settings.tolerance;
+    const bool sure = small && slips <= speed_error;
     const double slope = buffers.gradient.dot(buffers.correction);
     const double angle = largest_angle(buffers.correction);
     double share = angle > kLargestTurn ? kLargestTurn / angle : 1.0;
@@ -209,24 +216,18 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
     double next = value;
     for (int halving = 0; halving < kMostHalvings; ++halving) {
       move(buffers.pose, buffers.correction, share, buffers.trial);
-      if (!last) next = potential.value(buffers.trial);
-      found = last || next <= value + kDescent * share * slope + kRoundOff * std::abs(value);
+      if (!sure || !buffers.contact.empty()) next = potential.value(buffers.trial);
+      found = sure || next <= value + kDescent * share * slope + kRoundOff * std::abs(value);
       if (found) break;
       share *= 0.5;
     }
     if (!found) return;
-    // Newton's corrections that run into the kinks of friction are cut short.
-    friction = share < 1.0 && angle <= kLargestTurn ? FrictionHessian::Majorant : FrictionHessian::Exact;
+    buffers.contact.turn_friction(share);
     std::swap(buffers.pose, buffers.trial);
     value = next;
     begin_at_pose();
-    if (last) {
-      // Friction is so steep in the slip that the rest of the correction would be visible in the velocities.
-      if (!buffers.contact.empty() && potential.refine()) {
-        move(buffers.pose, buffers.correction, 1.0, buffers.trial);
-        std::swap(buffers.pose, buffers.trial);
-        potential.differentiate(buffers.pose);
-      }
+    // Friction is so steep in the slip that forces, and with them velocities, may err where the pose does not.
+    if (small && (buffers.contact.empty() || potential.residual_speed(settings.length) <= speed_error || is_rounding(buffers.correction, buffers.pose))) {
       report.within_tolerance = true;
       return;
     }
@@ -269,6 +270,24 @@ void freeze(const StepProblem& problem, double time, const ParticleState& at, co
   }
 }
 
+/// The pose of least potential of three: free flight; the start, where bonds are stiff; the start moved on by its velocities, where bodies rest on others.
+void guess(const ParticleSet& set, double h, const StepPotential& potential, ImplicitBuffers& buffers) {
+  buffers.pose = buffers.flight;
+  double least = potential.value(buffers.flight);
+  const auto offer = [&](const ParticleState& pose) {
+    const double value = potential.value(pose);
+    if (!(value < least)) return;
+    least = value;
+    buffers.pose = pose;
+  };
+  offer(buffers.start);
+  if (buffers.contact.empty()) return;
+  Loads none;
+  none.reset(set.size());
+  fly(set, buffers.start, none, h, buffers.trial);
+  offer(buffers.trial);
+}
+
 /// Momenta after dt under the loads at `buffers.pose`; books impulses and, by the way from `start` to `state`, works.
 void finish(const ParticleSet& set, const ParticleState& start, double dt, const ImplicitBuffers& buffers,
             ParticleState& state, Ledger& ledger) {
@@ -293,6 +312,20 @@ void finish(const ParticleSet& set, const ParticleState& start, double dt, const
   ledger.external_angular_impulse -= dt * sample.moment_on_fixed;
   ledger.external_work += dt * sample.power_of_fixed;
   ledger.dissipated += dt * sample.dissipated_at_fixed;
+}
+
+/// Of implicit midpoint: positions follow the pose, momenta the loads. What Newton's method leaves between them changes x cross p, which the spins make up for.
+void keep_angular_momentum(const ParticleSet& set, const ParticleState& start, double h, const ParticleState& pose, ParticleState& state, Ledger& ledger) {
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (holds_position(set, i)) continue;
+    const Vec3 velocity = 0.5 * (start.velocity[i] + state.velocity[i]);
+    const Vec3 change = 2.0 * set.mass[i] * Vec3(pose.position[i] - start.position[i] - h * velocity).cross(velocity);
+    if (holds_orientation(set, i)) {
+      ledger.external_angular_impulse += change;
+    } else {
+      state.angular_momentum[i] -= free_rotation(set.pinned[i], change);
+    }
+  }
 }
 
 void book_external_work(const ParticleSet& set, const ParticleState& start, const ParticleState& state,
@@ -343,15 +376,16 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   buffers.damping.clear();
 
   StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
-  // Stiff bonds make free flight a bad first guess, and a bad pose for the matrices of damping: the pose before the step may be a better one.
-  buffers.pose = potential.value(buffers.flight) <= potential.value(state) ? buffers.flight : state;
+  guess(set, h, potential, buffers);
   buffers.damping.begin(set, interactions, buffers.start, buffers.pose, h, midpoint);
-  minimise(settings, potential, buffers, report);
+  constexpr double kOfStickSpeed = 5e-3;  // velocities at the end of a step tell what holds to a hundredth of the friction
+  minimise(settings, problem.contact != nullptr ? kOfStickSpeed * problem.contact->stick_speed : 0.0, potential, buffers, report);
 
   const ParticleState& start = buffers.start;
   buffers.damping.finish(buffers.pose, dt, buffers.laws, ledger);
   if (problem.contact != nullptr) buffers.contact.finish(buffers.pose, dt, buffers.laws, ledger, problem.contact->load);
   finish(set, start, dt, buffers, state, ledger);
+  if (midpoint && !buffers.contact.empty()) keep_angular_momentum(set, start, h, buffers.pose, state, ledger);
   for (std::size_t i = 0; i < n; ++i) {
     if (midpoint && !holds_position(set, i)) {
       state.position[i] = Vec3(2.0 * buffers.pose.position[i] - start.position[i]);
