@@ -47,49 +47,75 @@ void DampingTerm::begin(const ParticleSet& set, const Interactions& interactions
   factor_ = midpoint ? 1.0 + kBeyondMiddle * z * z / (1.0 + z * z) : 1.0;
 }
 
-DampingTerm::Vec12 DampingTerm::moved(std::size_t k, const ParticleState& pose) const {
+void DampingTerm::place(const ParticleState& pose) {
+  moved_.resize(pose.size());
+  turned_.resize(pose.size());
+  for (std::size_t i = 0; i < pose.size(); ++i) {
+    moved_[i] = pose.position[i] - start_->position[i];
+    turned_[i] = rotation_log(pose.orientation[i] * start_->orientation[i].conjugate());
+  }
+}
+
+DampingTerm::Vec12 DampingTerm::moved(std::size_t k) const {
   const auto [a, b] = coupled_[k];
   Vec12 s;
-  s << pose.position[a] - start_->position[a], rotation_log(pose.orientation[a] * start_->orientation[a].conjugate()),
-      pose.position[b] - start_->position[b], rotation_log(pose.orientation[b] * start_->orientation[b].conjugate());
+  s << moved_[a], turned_[a], moved_[b], turned_[b];
   return s;
 }
 
-double DampingTerm::value(const ParticleState& pose) const {
+double DampingTerm::value(const ParticleState& pose) {
+  if (empty()) return 0.0;
+  place(pose);
   double sum = 0.0;
   for (std::size_t k = 0; k < pair_.size(); ++k) {
-    const Vec12 v = velocity(pair_[k], moved(k, pose));
+    const Vec12 v = velocity(pair_[k], moved(k));
     sum += v.dot(pair_[k].matrix * v);
   }
   return 0.5 * h_ / factor_ * sum;
 }
 
-void DampingTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradient) const {
-  for (std::size_t k = 0; k < pair_.size(); ++k) {
-    const Vec12 s = moved(k, pose), load = pair_[k].matrix * velocity(pair_[k], s);
-    for (const auto& [i, row] : {std::pair{coupled_[k].first, 0}, std::pair{coupled_[k].second, 6}}) {
-      const auto at = static_cast<Eigen::Index>(6) * i;
-      gradient.segment<3>(at) += load.segment<3>(row);
-      // As in contact: d psi / d phi of psi = log(exp(phi) exp(psi)) is J_r^-1(-psi).
-      gradient.segment<3>(at + 3) += inverse_right_jacobian(-s.segment<3>(row + 3)).transpose() * load.segment<3>(row + 3);
-    }
-  }
-}
-
-void DampingTerm::add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian) const {
-  for (std::size_t k = 0; k < pair_.size(); ++k) {
-    const Vec12 s = moved(k, pose);
-    PairHessian map = PairHessian::Identity();
-    map.block<3, 3>(3, 3) = inverse_right_jacobian(-s.segment<3>(3));
-    map.block<3, 3>(9, 9) = inverse_right_jacobian(-s.segment<3>(9));
-    hessian.add_pair(first_pair + k, factor_ / h_ * map.transpose() * pair_[k].matrix * map);
-  }
-}
-
-void DampingTerm::finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger) const {
+void DampingTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradient) {
+  if (empty()) return;
+  place(pose);
+  std::vector<Vec3> force(pose.size(), Vec3::Zero()), torque(pose.size(), Vec3::Zero());
   for (std::size_t k = 0; k < pair_.size(); ++k) {
     const auto [a, b] = coupled_[k];
-    const Vec12 s = moved(k, pose), load = -pair_[k].matrix * velocity(pair_[k], s);
+    const Vec12 load = pair_[k].matrix * velocity(pair_[k], moved(k));
+    force[a] += load.segment<3>(0);
+    torque[a] += load.segment<3>(3);
+    force[b] += load.segment<3>(6);
+    torque[b] += load.segment<3>(9);
+  }
+  for (std::size_t i = 0; i < pose.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(6 * i);
+    gradient.segment<3>(row) += force[i];
+    // As in contact: d psi / d phi of psi = log(exp(phi) exp(psi)) is J_r^-1(-psi).
+    gradient.segment<3>(row + 3) += inverse_right_jacobian(-turned_[i]).transpose() * torque[i];
+  }
+}
+
+void DampingTerm::add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian) {
+  if (empty()) return;
+  place(pose);
+  std::vector<Mat3> map(pose.size());
+  for (std::size_t i = 0; i < pose.size(); ++i) map[i] = inverse_right_jacobian(-turned_[i]);
+  for (std::size_t k = 0; k < pair_.size(); ++k) {
+    const auto [a, b] = coupled_[k];
+    PairHessian h = factor_ / h_ * pair_[k].matrix;
+    h.middleCols<3>(3) = (h.middleCols<3>(3) * map[a]).eval();
+    h.middleCols<3>(9) = (h.middleCols<3>(9) * map[b]).eval();
+    h.middleRows<3>(3) = (map[a].transpose() * h.middleRows<3>(3)).eval();
+    h.middleRows<3>(9) = (map[b].transpose() * h.middleRows<3>(9)).eval();
+    hessian.add_pair(first_pair + k, h);
+  }
+}
+
+void DampingTerm::finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger) {
+  if (empty()) return;
+  place(pose);
+  for (std::size_t k = 0; k < pair_.size(); ++k) {
+    const auto [a, b] = coupled_[k];
+    const Vec12 s = moved(k), load = -pair_[k].matrix * velocity(pair_[k], s);
     const Vec3 force = load.segment<3>(6);
     // The moment of the two forces at the pose itself; D has that of the predicted one.
     const Vec3 rest = 0.5 * (load.segment<3>(3) + load.segment<3>(9) + (pose.position[b] - pose.position[a]).cross(force));

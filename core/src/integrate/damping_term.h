@@ -30,13 +30,13 @@ class DampingTerm {
   /// The two particles of each pair.
   [[nodiscard]] const std::vector<std::pair<std::uint32_t, std::uint32_t>>& coupled() const { return coupled_; }
 
-  [[nodiscard]] double value(const ParticleState& pose) const;
+  [[nodiscard]] double value(const ParticleState& pose);
   /// Adds the gradient in (displacement, rotation) of each particle, the rotation applied from the left, world axes.
-  void add_gradient(const ParticleState& pose, Eigen::VectorXd& gradient) const;
+  void add_gradient(const ParticleState& pose, Eigen::VectorXd& gradient);
   /// @param first_pair  index of `coupled()[0]` in the list of the matrix
-  void add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian) const;
+  void add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian);
   /// Adds the loads on particles at the pose, whose sums and moments vanish, and books what they take over `dt`.
-  void finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger) const;
+  void finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger);
 
  private:
   using Vec12 = Eigen::Matrix<double, 12, 1, Eigen::DontAlign>;
@@ -44,14 +44,17 @@ class DampingTerm {
     PairHessian matrix;
     Vec12 start = Vec12::Zero();  ///< velocities at the start
   };
-  /// Displacement and rotation of both particles since the start.
-  [[nodiscard]] Vec12 moved(std::size_t k, const ParticleState& pose) const;
+  /// Moves all particles to the pose.
+  void place(const ParticleState& pose);
+  /// Displacement and rotation of both particles of a pair since the start.
+  [[nodiscard]] Vec12 moved(std::size_t k) const;
   [[nodiscard]] Vec12 velocity(const Damped& pair, const Vec12& moved) const { return factor_ / h_ * moved - (factor_ - 1.0) * pair.start; }
 
   const ParticleState* start_ = nullptr;
   double h_ = 0.0;
   double factor_ = 1.0;    ///< t
   bool midpoint_ = false;
+  std::vector<Vec3> moved_, turned_;  ///< since the start, by particle, at the last call of `place` [m], [rad]
   std::vector<Damped> pair_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coupled_;
 };

@@ -72,25 +72,27 @@ void StepHessian::build_pattern(std::span<const std::pair<std::uint32_t, std::ui
   pairs_.assign(pairs.begin(), pairs.end());
   std::vector<std::vector<std::uint32_t>> below(n);
   for (const auto& [a, b] : pairs_) below[std::min(a, b)].push_back(std::max(a, b));
-  std::vector<int> rows;
+  Eigen::Index entries = 0;
   for (auto& list : below) {
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
-    for (int c = 0; c < 6; ++c) rows.push_back(6 - c + 6 * static_cast<int>(list.size()));
+    entries += 21 + 36 * static_cast<Eigen::Index>(list.size());  // the lower half of the diagonal block, and whole blocks below it
   }
   const auto size = static_cast<Eigen::Index>(6 * n);
   matrix_.resize(size, size);
-  matrix_.reserve(rows);
+  matrix_.resizeNonZeros(entries);
+  int entry = 0;
   for (std::size_t a = 0; a < n; ++a) {
-    for (int c = 0; c < 6; ++c) {
-      const auto column = static_cast<Eigen::Index>(6 * a) + c;
-      for (Eigen::Index row = column; row < static_cast<Eigen::Index>(6 * a + 6); ++row) matrix_.insert(row, column) = 0.0;
+    const int first = 6 * static_cast<int>(a);
+    for (int column = first; column < first + 6; ++column) {
+      matrix_.outerIndexPtr()[column] = entry;
+      for (int row = column; row < first + 6; ++row) matrix_.innerIndexPtr()[entry++] = row;
       for (const std::uint32_t b : below[a]) {
-        for (int r = 0; r < 6; ++r) matrix_.insert(static_cast<Eigen::Index>(6 * b) + r, column) = 0.0;
+        for (int r = 0; r < 6; ++r) matrix_.innerIndexPtr()[entry++] = 6 * static_cast<int>(b) + r;
       }
     }
   }
-  matrix_.makeCompressed();
+  matrix_.outerIndexPtr()[size] = entry;
   rank_.resize(pairs_.size());
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const auto& list = below[std::min(pairs_[k].first, pairs_[k].second)];
@@ -107,17 +109,19 @@ bool StepHessian::held(std::uint32_t particle, int row) const {
 }
 
 void StepHessian::add_diagonal(std::uint32_t i, const Eigen::Ref<const Mat6, 0, Eigen::OuterStride<>>& h) {
+  const bool free = pinned_[i] == 0;
   for (int c = 0; c < 6; ++c) {
-    if (held(i, c)) continue;
+    if (!free && held(i, c)) continue;
     double* const column = matrix_.valuePtr() + matrix_.outerIndexPtr()[6 * static_cast<Eigen::Index>(i) + c];
     for (int r = c; r < 6; ++r) {
-      if (!held(i, r)) column[r - c] += h(r, c);
+      if (free || !held(i, r)) column[r - c] += h(r, c);
     }
   }
 }
 
 void StepHessian::add_particle(std::uint32_t i, const Mat6& h) {
   add_diagonal(i, h);
+  if (pinned_[i] == 0) return;
   for (int c = 0; c < 6; ++c) {
     if (held(i, c)) matrix_.valuePtr()[matrix_.outerIndexPtr()[6 * static_cast<Eigen::Index>(i) + c]] = 1.0;
   }
@@ -132,12 +136,13 @@ void StepHessian::add_pair(std::size_t index, const PairHessian& h) {
 
 void StepHessian::add_coupling(std::size_t index, const Mat6& h) {
   const auto [low, high] = std::minmax(pairs_[index].first, pairs_[index].second);
+  const bool free = pinned_[low] == 0 && pinned_[high] == 0;
   for (int c = 0; c < 6; ++c) {
-    if (held(low, c)) continue;
+    if (!free && held(low, c)) continue;
     double* const column = matrix_.valuePtr() + matrix_.outerIndexPtr()[6 * static_cast<Eigen::Index>(low) + c] +
                            (6 - c) + 6 * static_cast<std::ptrdiff_t>(rank_[index]);
     for (int r = 0; r < 6; ++r) {
-      if (!held(high, r)) column[r] += h(r, c);
+      if (free || !held(high, r)) column[r] += h(r, c);
     }
   }
 }
