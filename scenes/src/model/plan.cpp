@@ -235,8 +235,8 @@ class StepCounts {
     for (const ObjectModel& object : model_.objects) {
       if (object.collides) size = std::min(size, size_of(object));
     }
-    const double gravity = scene_.gravity.norm(), speed = std::max(speeds_.linear, std::sqrt(gravity * size));
-    const double blur = kPart * friction * (gravity + model_.contact_frequency * speed);  // of v, by dt [m/s^2]
+    const double drive = scene_.gravity.norm() + largest_push(), speed = std::max(speeds_.linear, std::sqrt(drive * size));
+    const double blur = kPart * friction * (drive + model_.contact_frequency * speed);  // of v, by dt [m/s^2]
     return of_step(blur > 0.0 ? accuracy * size / (blur * scene_.duration) : frame_);
   }
 
@@ -247,6 +247,20 @@ class StepCounts {
   }
 
  private:
+  /// By the loads on one object, over its mass [m/s^2].
+  [[nodiscard]] double largest_push() const {
+    double largest = 0.0;
+    for (const ObjectModel& object : model_.objects) {
+      double force = 0.0, mass = 0.0;
+      for (std::uint32_t i = object.first; i < object.last; ++i) mass += model_.particles.mass[i];
+      for (const core::ExternalLoad& load : model_.interactions.external) {
+        if (load.particle < object.first || load.particle >= object.last) continue;
+        force += load.force.norm() * (load.course ? load.course->largest() : 1.0);
+      }
+      if (force > 0.0) largest = std::max(largest, force / mass);
+    }
+    return largest;
+  }
   [[nodiscard]] double of_step(double step) const {
     if (!(step > 0.0)) return std::numeric_limits<double>::infinity();
     return std::ldexp(1.0, core::halvings(frame_, std::min(step, longest_)));

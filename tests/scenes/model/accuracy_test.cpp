@@ -80,6 +80,27 @@ TEST(AccuracyKey, ChoosesByWhatItsErrorCosts) {
   EXPECT_EQ(choice(ball("accuracy: 1e-2\nintegrator: {method: symplectic}", 0.5)).settings.method, core::Integrator::Symplectic);
 }
 
+TEST(AccuracyKey, CountsTheFrictionOfBodiesThatLoadsPressTogether) {
+  const auto choice = [](const std::string& force) {
+    const Scene scene = read(R"(
+schema: 1
+duration: 2 s
+frame_rate: 24
+gravity: [0, 0, 0]
+objects:
+  - name: pressed
+    particles: {at: [0, 0, 0.3], mass: 0.05}
+    skeleton: [{shape: point, kernel: {radius: 0.2}}]
+    contact: {modulus: 2e4, friction: 0.4}
+    loads: [{particle: 0, force: )" + force + R"(}]
+ground: {friction: 0.4}
+)");
+    return plan_integrator(scene, build_model(scene)).settings.method;
+  };
+  EXPECT_EQ(choice("[0.5, 0, -2]"), core::Integrator::ImplicitMidpoint);
+  EXPECT_EQ(choice("[0, 0, 0]"), core::Integrator::Symplectic);  // nothing moves
+}
+
 TEST(ImplicitMethod, IsMidpointInStepsThatResolveContactAndElseBackwardEuler) {
   const auto choice = [](const std::string& keys) {
     const Scene scene = read(ball("integrator: {method: implicit}\n" + keys, 0.5));
