@@ -22,20 +22,6 @@ double thread_cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Difference at the end of the run of two simulations of a frame: the largest difference of positions, plus the drift of the object as a whole by the
-/// difference of its velocity, as if it moved freely from there on.
-double difference(const ObjectModel& object, const core::ParticleState& a, const core::ParticleState& b, double left) {
-  double farthest = 0.0;
-  Vec3 drift = Vec3::Zero();
-  for (std::uint32_t i = object.first; i < object.last; ++i) {
-    const Vec3 velocity = a.velocity[i] - b.velocity[i];
-    const double apart = (a.position[i] - b.position[i]).norm();
-    farthest = std::max(farthest, object.separate ? apart + left * velocity.norm() : apart);
-    drift += velocity / static_cast<double>(object.last - object.first);
-  }
-  return object.separate ? farthest : farthest + left * drift.norm();
-}
-
 }  // namespace
 
 StageErrorEstimator::StageErrorEstimator(const Scene& scene, const SimulationOptions& options, int last_frame)
@@ -50,39 +36,74 @@ void StageErrorEstimator::begin(const Simulation& simulation) {
   touched_ = points_of(simulation);
 }
 
+void StageErrorEstimator::follow(const Simulation& simulation) {
+  const Model& model = simulation.model();
+  path_.resize(model.objects.size(), 0.0);
+  moved_.assign(model.objects.size(), 0.0);
+  for (std::size_t k = 0; k < model.objects.size(); ++k) {
+    const ObjectModel& object = model.objects[k];
+    for (std::uint32_t i = object.first; i < object.last; ++i) {
+      moved_[k] += (simulation.state().particles.position[i] - before_->particles.position[i]).norm() / static_cast<double>(object.last - object.first);
+    }
+    path_[k] += moved_[k];
+  }
+}
+
 double StageErrorEstimator::end(const Simulation& simulation) {
+  follow(simulation);
   kind_ = points_of(simulation) > touched_ ? 1 : 0;
   if (seen_[kind_]++ % kEvery[kind_] != 0) return 0.0;
   const double began = thread_cpu_seconds();
   const bool whole = simulation.state().halvings == 0;
   const double error = contact_error(scene_);
-  compare(simulation, whole ? 1 : -1, error, whole ? finer_ : coarser_);
+  // Of order p: steps twice as long err by 2^p e, half as long by 2^-p e.
+  const double ratio = simulation.integrator().settings.method == core::Integrator::BackwardEuler ? 2.0 : 4.0;
+  compare(simulation, {whole ? 1 : -1, error, whole ? ratio / (ratio - 1.0) : 1.0 / (ratio - 1.0)}, whole ? finer_ : coarser_);
   const double finer_contact = std::max(kFinestContact, kFinerContact * error);
-  if (accuracy_of(scene_) && finer_contact < error) compare(simulation, 0, finer_contact, contact_);
+  if (accuracy_of(scene_) && finer_contact < error) compare(simulation, {0, finer_contact, 1.0}, contact_);
   return thread_cpu_seconds() - began;
 }
 
-void StageErrorEstimator::compare(const Simulation& simulation, int finer, double contact_error, Variant& variant) {
+void StageErrorEstimator::compare(const Simulation& simulation, const Change& change, Variant& variant) {
   const Model& model = simulation.model();
   try {
     if (!variant.simulation) {
       Scene scene = scene_;
-      scene.contact.error = contact_error;
+      scene.contact.error = change.contact_error;
       SimulationOptions options = options_;
-      options.finer = finer;
+      options.finer = change.finer;
       variant.simulation.emplace(std::move(scene), options);
-      for (auto& sum : variant.sum) sum.assign(model.objects.size(), 0.0);
+      for (auto& found : variant.found) found.resize(model.objects.size());
     }
     variant.simulation->restore(*before_);
     variant.simulation->step_frame();
   } catch (const Error&) {
     return;  // steps that are too long for this frame give no estimate
   }
-  const double left = (last_frame_ - simulation.frame()) / scene_.frame_rate;
-  for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    variant.sum[kind_][i] += difference(model.objects[i], simulation.state().particles, variant.simulation->state().particles, left);
+  const core::ParticleState &a = simulation.state().particles, &b = variant.simulation->state().particles;
+  for (std::size_t k = 0; k < model.objects.size(); ++k) {
+    const ObjectModel& object = model.objects[k];
+    Difference now{.speed = moved_[k] * scene_.frame_rate, .path = path_[k], .left = (last_frame_ - simulation.frame()) / scene_.frame_rate};
+    Vec3 mean = Vec3::Zero();
+    for (std::uint32_t i = object.first; i < object.last; ++i) {
+      const Vec3 velocity = a.velocity[i] - b.velocity[i];
+      now.apart = std::max(now.apart, (a.position[i] - b.position[i]).norm());
+      now.velocity = std::max(now.velocity, velocity.norm());
+      mean += velocity / static_cast<double>(object.last - object.first);
+    }
+    if (!object.separate) now.velocity = mean.norm();
+    now.apart *= change.share;
+    now.velocity *= change.share;
+    variant.found[kind_][k].push_back(now);
   }
   ++variant.frames[kind_];
+}
+
+/// A difference of velocities lasts as long as the motion itself: until the end where the object keeps its speed, less where it comes to rest.
+double StageErrorEstimator::displacement(const Difference& found, std::size_t object) const {
+  const double path = path_[object] - found.path;
+  const double lasts = found.speed * found.left > path ? path / found.speed : found.left;
+  return found.apart + lasts * found.velocity;
 }
 
 /// Sums are scaled from the frames that were simulated again to all frames of their kind.
@@ -95,7 +116,9 @@ ErrorEstimate StageErrorEstimator::estimate_of(std::initializer_list<const Varia
     if (frames == 0) continue;
     out.frames += frames;
     for (const Variant* variant : variants) {
-      for (std::size_t i = 0; i < variant->sum[kind].size(); ++i) position[i] += variant->sum[kind][i] * seen_[kind] / frames;
+      for (std::size_t i = 0; i < variant->found[kind].size(); ++i) {
+        for (const Difference& found : variant->found[kind][i]) position[i] += displacement(found, i) * seen_[kind] / frames;
+      }
     }
   }
   for (std::size_t i = 0; out.frames > 0 && i < position.size(); ++i) {

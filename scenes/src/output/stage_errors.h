@@ -25,19 +25,38 @@ class StageErrorEstimator {
   [[nodiscard]] StageErrors estimate(const Model& model) const;
 
  private:
+  /// What is other than in the run.
+  struct Change {
+    int finer = 0;                ///< halvings of the step
+    double contact_error = 0.0;   ///< relative
+    double share = 1.0;           ///< error of the run, over the difference
+  };
+  /// An object in the second simulation of a frame.
+  struct Difference {
+    double apart = 0.0;     ///< estimated error of positions, the largest [m]
+    double velocity = 0.0;  ///< likewise of the object as a whole, or of separate particles [m/s]
+    double speed = 0.0;     ///< mean over its particles in the frame [m/s]
+    double path = 0.0;      ///< mean since the begin of the run [m]
+    double left = 0.0;      ///< time until the end of the run [s]
+  };
   /// A second simulation, made when it is first needed, and the differences of its frames.
   struct Variant {
     std::optional<Simulation> simulation;
-    std::array<int, 2> frames{};                ///< by whether anything touched in them
-    std::array<std::vector<double>, 2> sum{};   ///< likewise, by object: displacement by the end of the run caused by these frames [m]
+    std::array<int, 2> frames{};                                  ///< by whether anything touched in them
+    std::array<std::vector<std::vector<Difference>>, 2> found{};  ///< likewise, by object
   };
-  void compare(const Simulation& simulation, int finer, double contact_error, Variant& variant);
+  void follow(const Simulation& simulation);
+  /// Displacement at the end of the run by the difference of a frame [m].
+  [[nodiscard]] double displacement(const Difference& found, std::size_t object) const;
+  void compare(const Simulation& simulation, const Change& change, Variant& variant);
   [[nodiscard]] ErrorEstimate estimate_of(std::initializer_list<const Variant*> variants, const Model& model) const;
 
   const Scene& scene_;
   SimulationOptions options_;
   int last_frame_;
   std::optional<State> before_;
+  std::vector<double> path_;         ///< by object: mean of its particles [m]
+  std::vector<double> moved_;        ///< in the last frame [m]
   std::uint64_t touched_ = 0;        ///< points of contact, before the frame
   std::size_t kind_ = 0;             ///< of the frame: whether anything touched
   std::array<int, 2> seen_{};        ///< frames, by that

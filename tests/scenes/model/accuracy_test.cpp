@@ -285,6 +285,26 @@ objects:
   EXPECT_NEAR(error(8) / error(16), 4.0, 0.2);
 }
 
+TEST(StageErrors, OfTimeDoNotGrowWhileBodiesRest) {
+  // The ball rests after half a second: what its speed erred by as it fell is gone.
+  const auto estimate = [](const std::string& duration) {
+    return errors_of("schema: 1\nduration: " + duration + R"(
+frame_rate: 24
+gravity: [0, 0, -9.81]
+objects:
+  - name: ball
+    particles: {at: [0, 0, 0.3], mass: 0.1, inertia_radius: 0.03}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]
+    contact: {modulus: 1e4, friction: 0.5, dissipation: 2}
+    medium: {linear: 0.5, angular: 1e-3}
+ground: {height: 0, friction: 0.5}
+)").at("errors").at("time").at("position_m").get<double>();
+  };
+  const double brief = estimate("1.5 s"), late = estimate("6 s");
+  EXPECT_GT(brief, 0.0);
+  EXPECT_LT(late, 2.0 * brief);
+}
+
 TEST(StageErrors, NameTheLargestAndWhatFrictionIsBlurredBy) {
   const nlohmann::json blurred = errors_of(ball("accuracy: 1e-2\nintegrator: {method: symplectic}\ntime_step: {substeps: 64}", 0.5));
   EXPECT_EQ(blurred.at("errors").at("largest"), "time");

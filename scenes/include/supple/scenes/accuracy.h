@@ -51,7 +51,7 @@ struct ErrorEstimate {
 
 /// Estimated errors of the stages of a run.
 struct StageErrors {
-  ErrorEstimate time;      ///< the difference to steps twice as long, summed over the frames of a sample and scaled to all
+  ErrorEstimate time;      ///< by the difference to steps twice as long, summed over the frames of a sample and scaled to all
   ErrorEstimate contact;   ///< likewise to a tenth of contact.error; of runs with an accuracy
   ErrorEstimate mesh;      ///< the error to which meshes are made
 };
