@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/support.h"
+#include "programs.h"
 #include "spiral_kernel.h"
 #include "supple/core/gay_berne.h"
 #include "supple/core/hash.h"
@@ -513,7 +514,7 @@ void bench_spiral(int count, bool rubs) {
 }  // namespace
 
 /// @param argv  melt [FILE [STEPS]], ellipsoids [FILE [STEPS]], threads, laws, lists, spiral; all when absent
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::core_bench(int argc, char** argv) {
   constexpr std::string_view kUsage = "core_bench [melt|ellipsoids [FILE [STEPS]]]\n"
                                       "       core_bench threads|laws|lists|spiral";
   supple::benchmarks::answer_usage(argc, argv, kUsage, 3);

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "programs.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/scenes/accuracy.h"
@@ -30,23 +31,23 @@ namespace fs = std::filesystem;
 
 struct Case {
   std::string_view name;
-  std::string_view file;  ///< in the source tree
+  std::string_view file;  ///< of the library; without a folder: of the benchmarks
   double seconds;         ///< simulated of it
 };
 
 constexpr Case kCases[] = {
-    {"jelly", "tests/benchmarks/scenes/jelly_stairs.yaml", 2.0},
-    {"letter", "tests/benchmarks/scenes/letter_s.yaml", 1.0},
-    {"chain", "tests/benchmarks/scenes/chain_hit.yaml", 1.0},
-    {"ball_hits_spiral", "scenes/library/figures/ball_hits_spiral.yaml", 2.0},
-    {"spiral_uncoils", "scenes/library/figures/spiral_uncoils.yaml", 4.0},
-    {"pile_rests", "scenes/library/contacts/pile_rests.yaml", 0.5},
-    {"hand_closes", "scenes/library/objects/hand_closes.yaml", 0.25},
-    {"shell_dents", "scenes/library/objects/shell_dents.yaml", 1.0},
-    {"plate_breaks", "scenes/library/objects/plate_breaks.yaml", 1.0},
-    {"slide", "scenes/library/contacts/slide_on_incline.yaml", 1.0},
-    {"cradle", "scenes/library/contacts/newtons_cradle.yaml", 2.0},
-    {"ball_in_ring", "scenes/library/contacts/ball_in_ring.yaml", 0.4},
+    {"jelly", "jelly_stairs.yaml", 2.0},
+    {"letter", "letter_s.yaml", 1.0},
+    {"chain", "chain_hit.yaml", 1.0},
+    {"ball_hits_spiral", "figures/ball_hits_spiral.yaml", 2.0},
+    {"spiral_uncoils", "figures/spiral_uncoils.yaml", 4.0},
+    {"pile_rests", "contacts/pile_rests.yaml", 0.5},
+    {"hand_closes", "objects/hand_closes.yaml", 0.25},
+    {"shell_dents", "objects/shell_dents.yaml", 1.0},
+    {"plate_breaks", "objects/plate_breaks.yaml", 1.0},
+    {"slide", "contacts/slide_on_incline.yaml", 1.0},
+    {"cradle", "contacts/newtons_cradle.yaml", 2.0},
+    {"ball_in_ring", "contacts/ball_in_ring.yaml", 0.4},
 };
 
 struct Settings {
@@ -65,7 +66,20 @@ struct Motion {
   std::string method;
 };
 
-fs::path source_file(const Case& c) { return fs::path(SUPPLE_SOURCE_DIR) / c.file; }
+/// From the place of the program: installed, in the Python package, or in the source tree. @throws Error{Io} where it is in none
+fs::path source_file(const Case& c) {
+  const fs::path program = fs::read_symlink("/proc/self/exe"), above = program.parent_path().parent_path(), root = above.parent_path();
+  const bool own = !fs::path(c.file).has_parent_path();
+  const fs::path shipped = own ? "scenes/benchmarks" : "scenes/library";
+  for (const fs::path& folder : {root / "share/supple" / shipped, above / shipped, root.parent_path() / (own ? "tests/benchmarks/scenes" : shipped)}) {
+    if (fs::exists(folder / c.file)) return folder / c.file;
+  }
+  throw Error(ErrorKind::Io, Fault{.place = program.string(),
+                                   .key = {},
+                                   .expected = "expected " + (shipped / c.file).string() + " in share/supple of the installation, or in the source tree of the build",
+                                   .found = "none",
+                                   .hint = {}});
+}
 
 Scene scene_of(const Case& c, const Settings& settings, double accuracy) {
   std::vector<std::string> set{"accuracy=" + std::to_string(accuracy)};
@@ -166,7 +180,7 @@ void bench(const Case& c, const Settings& settings) {
 
 }  // namespace
 
-int main(int argc, char** argv) try {
+int supple::benchmarks::programs::scene_bench(int argc, char** argv) try {
   constexpr std::string_view kUsage = "scene_bench [NAME ...] [--accuracy A ...] [--set path.to.key=value ...]    all scenes where none is named";
   supple::benchmarks::answer_usage(argc, argv, kUsage, std::numeric_limits<std::size_t>::max(), {{"--accuracy", 1}, {"--set", 1}});
   Settings settings;
