@@ -8,13 +8,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "output/job_scripts.h"
 #include "output/spare_memory.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "sweep/job_scripts.h"
 
 namespace supple::scenes {
 namespace {
