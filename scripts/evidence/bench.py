@@ -20,6 +20,7 @@ class Bench:
         self.faults, self.losses, self.plots, self.commands = {}, [], [], []
         self.part, self.end = "", 0.0
         self.numbers = itertools.count(1)
+        self.jelly = []  # rows of this scene, once it was measured
         self.load = os.getloadavg()[0]
         self.date = time.strftime("%Y-%m-%d")
         shutil.rmtree(work, ignore_errors=True)
@@ -39,6 +40,7 @@ class Bench:
         """Standard output of a program. @raise Failed: it ends with a code, or not within the time of the part or its own"""
         words = [str(word) for word in words]
         shown = shown or " ".join(["supple", *words[1:]] if words[0] == str(self.supple) else words)
+        shown = shown.replace(f"{self.work}/", "").replace(f"{self.root}/", "")
         self.commands.append(shown)
         left = min(self.end - time.monotonic(), budget_s or float("inf"))
         if left <= 0.0:
@@ -81,8 +83,8 @@ class Bench:
         return f"![{words}](images/evidence_{name}.svg)"
 
     def command_lines(self):
-        """The commands of the part so far as a block; paths of scratch files by their names."""
-        return [f"    {command.replace(str(self.work) + '/', '').replace(str(self.root) + '/', '')}" for command in dict.fromkeys(self.commands)] + [""]
+        """The commands of the part so far as a block."""
+        return [f"    {command}" for command in dict.fromkeys(self.commands)] + [""]
 
     def revision(self):
         words = ["git", "-C", str(self.root), "describe", "--always", "--dirty"]

@@ -42,12 +42,10 @@ QUERY_NAME = re.compile(r"collision/poses/(.*)/error=(.*)")
 
 
 def queries(b):
-    rows = b.rows("collision/poses", 20 if b.quick else 200)
+    rows = [row for row in b.rows("collision/poses", 20 if b.quick else 200) if row["name"].endswith(("error=0.001", "error=1e-06"))]
     cells = []
     for row in rows:
         case, asked = QUERY_NAME.fullmatch(row["name"]).groups()
-        if float(asked) not in (1e-3, 1e-6):
-            continue
         cells.append([case.replace("_", " ").replace("/", ", "), asked, row["poses"], f'{row["cpu_us_median"]:.3g} / {row["cpu_us_max"]:.3g}', f'{row["forces_us_median"]:.2g}',
                       f'{row["error_median"]:.1e} / {row["error"]:.1e}'])
         if row["error"] > float(asked):
@@ -114,6 +112,7 @@ def scenes(b):
             except Failed as fault:
                 b.fault(str(fault))
     found = rows_of(text)
+    b.jelly = found.get("jelly", [])
     if found:
         b.draw("scenes", draw_accuracy(found))
     cells = []
@@ -152,11 +151,15 @@ def skips(b):
 def stability(b):
     core, contacts = b.plot_path("core_stability"), b.plot_path("contact_stability")
     steps = b.bench("core/stability", core).strip().splitlines()
-    shots = b.bench("collision/stability", "--seed", 2026, contacts).strip().splitlines()
-    return b.command_lines() + ["Step, stiffness, compression and mass ratio of four systems of particles ([what the map shows](stability.md#particles-and-time-steps)): " + steps[-1] + ".", "",
-                                b.image("core_stability", "Map of stable runs of particles"), "",
-                                "Stiffness, mass ratio and speed of bodies in contact ([what the map shows](stability.md#contact)).", ""] + shots[:-1] + [
-        b.image("contact_stability", "Map of contact runs"), "", shots[-1] + "."]
+    lines = ["Step, stiffness, compression and mass ratio of four systems of particles ([what the map shows](stability.md#particles-and-time-steps)): " + steps[-1] + ".", "",
+             b.image("core_stability", "Map of stable runs of particles"), ""]
+    if b.quick:
+        lines.append("The quick form leaves out the thousand runs of bodies in contact.")
+    else:
+        shots = b.bench("collision/stability", "--seed", 2026, contacts).strip().splitlines()
+        lines += ["Stiffness, mass ratio and speed of bodies in contact ([what the map shows](stability.md#contact)).", "", *shots[:-1],
+                  b.image("contact_stability", "Map of contact runs"), "", shots[-1] + "."]
+    return b.command_lines() + lines
 
 
 def particles(b):
@@ -171,7 +174,7 @@ def particles(b):
     slopes = {name: plots.exponent(curve[-2:]) for name, curve in by_pairs.items()}
     worst = max(slopes, key=slopes.get)
     if slopes[worst] > 1.03:
-        b.loss(f"From {series[worst][-2][0]:,} to {series[worst][-1][0]:,} particles the time of `{worst}` grows with exponent {slopes[worst]:.2f} of the pairs: beyond the caches a particle's neighbours come from memory.")
+        b.loss(f"From {series[worst][-2][0]:,} to {series[worst][-1][0]:,} particles the time of `{worst}` grows with exponent {slopes[worst]:.2f} of the pairs: beyond the caches, of which other programs take their part, a particle's neighbours come from memory.")
     return b.command_lines() + [b.image("particles", "CPU time of one evaluation over the number of particles"), "",
                                 "One evaluation of one pair law on particles of a disturbed lattice, and the making of its neighbour lists. A larger lattice has a smaller border, so pairs (of the lists: distances looked "
                                 "at) grow faster than particles.", ""] + table(
@@ -194,7 +197,8 @@ def bodies(b):
         series["a contact"].append((count, row["cpu_us_contact"] / 1e3))
         cells.append([f"{count:,}", f'{row["contacts"]:,}', f'{row["cpu_ms_step_min"]:.3g}', f'{row["cpu_us_contact"]:.2g}'])
     b.draw("bodies", plots.log_log(series, "bodies", "CPU ms"))
-    b.loss("A body in a dense pile costs more than one of few: balls of a settled pile have six to nine neighbours, two balls on the ground one each, so the exponent of a step exceeds 1. Time per contact is the fair measure.")
+    if plots.exponent(series["a step"]) > 1.0:
+        b.loss("A body in a dense pile costs more than one of few: balls of a settled pile have six to nine neighbours, two balls on the ground one each, so the exponent of a step exceeds 1. Time per contact is the fair measure.")
     return b.command_lines() + [b.image("bodies", "CPU time of a step over the number of bodies"), "", "Steps of settled balls in a bin, without sleeping, contact error 1e-2.", "",
                                 f'Fitted exponents over the number of bodies: of a step {plots.exponent(series["a step"]):.2f}, of a contact {plots.exponent(series["a contact"]):.2f}; '
                                 f'between the largest two {plots.exponent(series["a step"][-2:]):.2f} and {plots.exponent(series["a contact"][-2:]):.2f}.', ""] + table(
@@ -215,7 +219,7 @@ def mujoco(b):
     script = b.root / "tests/benchmarks/peers/jelly_mujoco.py"
     options = ["--seconds", "0.6", "--steps", "2e-3,1e-3"] if b.quick else ["--steps", "4e-3,2e-3,1e-3,5e-4"]
     theirs = [json.loads(line) for line in b.call([b.peers, script, *options], f"python tests/benchmarks/peers/jelly_mujoco.py {' '.join(options)}").splitlines()]
-    ours = [] if b.quick else b.rows("scenes/jelly", "--accuracy", "1e-2")
+    ours = [] if b.quick else b.jelly or b.rows("scenes/jelly", "--accuracy", "1e-2")
     series = {f"MuJoCo {version}": [(row["largest_error"], row["cpu_s_per_s"]) for row in theirs if row["finite"] and row["largest_error"] > 0]}
     if ours:
         series["supple"] = [(row["largest_error"], row["cpu_s_per_s"]) for row in ours]
@@ -246,7 +250,7 @@ ALL = (
     Part("pictures", "Pictures", 180.0, pictures),
     Part("scenes", "Whole scenes", 1500.0, scenes),
     Part("skips", "Skips on and off", 420.0, skips),
-    Part("stability", "Stability", 300.0, stability),
+    Part("stability", "Stability", 420.0, stability),
     Part("particles", "Scaling with particles", 300.0, particles),
     Part("bodies", "Scaling with bodies", 420.0, bodies),
     Part("conservation", "Conservation", 120.0, conservation),
