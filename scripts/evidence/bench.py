@@ -22,7 +22,7 @@ class Bench:
         self.numbers = itertools.count(1)
         self.jelly = []  # rows of this scene, once it was measured
         self.load = os.getloadavg()[0]
-        self.date = time.strftime("%Y-%m-%d")
+        self.date, self.program = time.strftime("%Y-%m-%d"), self.revision()
         shutil.rmtree(work, ignore_errors=True)
         work.mkdir(parents=True)
 
@@ -103,6 +103,6 @@ class Bench:
         return [f"| | |", "|---|---|",
                 f"| machine | {names[0] if names else platform.processor()}, {count} processors used, {memory:.0f} GiB, Linux {platform.release()} |",
                 f"| load before the first part | {self.load:.1f}{': the machine had other work, so times are upper bounds' if busy else ''} |",
-                f"| program | supple {self.revision()} |",
+                f"| program | supple {self.program} |",
                 f"| date | {self.date} |", "",
                 "Times are CPU times of one thread unless a line says otherwise. Commands are those of an installed tool; in a source tree `supple` is `build/release/bin/supple`."]
