@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs job files of `supple job` by OpenJD, Slurm and Ray on this machine and prints the figures of docs/scaling.md. Minutes; no part of scripts/test.sh.
-#   scripts/jobs.sh [--frames N] [overhead|openjd|slurm|ray ...]     all where none is named
+#   scripts/jobs.sh [--frames N] [overhead|openjd|slurm|ray|sweep ...]     all where none is named
 # Needs Python with venv. Slurm needs its Debian packages and root: apt-get install slurm-wlm munge
 set -eu
 cd "$(dirname "$0")/.."

@@ -22,12 +22,24 @@ check_component() {
     -DCOMPONENT="$name" "${hide[@]}" && cmake --build "$build" && "$build/component"
 }
 
-# check_package BUILD_FOLDER: installs a build into a scratch prefix and moves it; checks that no path of the source, the build or a
-# library is exported and that scenes, documents and licence are installed; tests each component alone; builds tests/package against
+# check_benchmarks SUPPLE SCRATCH: the benchmarks of an installed tool, called from elsewhere: all groups are there; one runs, and two scenes, of the library and not.
+check_benchmarks() {
+  local supple=$1 list=$2/benchmarks.txt rows=$2/benchmarks.jsonl
+  (cd / && "$supple" bench --list) >"$list" || return 1
+  if grep -q 'not built' "$list" || [[ $(grep -c ' built ' "$list") -lt 15 ]]; then
+    echo "error: $supple bench --list: expected 15 groups that are built, found:" && cat "$list" && return 1
+  fi
+  (cd / && "$supple" bench core/spiral && "$supple" bench scenes/spiral_uncoils && "$supple" bench scenes/chain) | tee "$rows" || return 1
+  [[ $(grep -c '"hash"' "$rows") -ge 4 && $(grep -c '"largest_error"' "$rows") == 2 ]] || { echo "error: expected rows of core/spiral and of two scenes"; return 1; }
+}
+
+# check_package BUILD_FOLDER: installs a build with its benchmarks into a scratch prefix and moves it; checks that no path of the source, the build or a
+# library is exported and that scenes, documents, licence and benchmarks are installed; tests each component alone; builds tests/package against
 # the whole package and runs it on a scene.
 check_package() {
   local build=$1 scratch=$supple_root/build/package name
   rm -rf "$scratch"
+  cmake --build "$build" --target benchmarks || return 1
   cmake --install "$build" --prefix "$scratch/first" && mv "$scratch/first" "$scratch/prefix" || return 1
   if grep -rnE --include='*.cmake' "$supple_root|[\"; ]/[A-Za-z0-9_./+-]*\.(so|a)" "$scratch/prefix"; then
     echo "error: the installed package contains absolute paths of the build machine (lines above)"
@@ -36,6 +48,7 @@ check_package() {
   for name in LICENSE architecture.md ball_hits_spiral.yaml; do
     [[ -n $(find "$scratch/prefix" -name "$name") ]] || { echo "error: $name is not installed"; return 1; }
   done
+  check_benchmarks "$scratch/prefix/bin/supple" "$scratch" || return 1
   for name in core implicit cgal collision render scenes; do
     [[ -f $(find "$scratch/prefix" -name "supple_${name}Targets.cmake") ]] || continue
     check_component "$name" "$scratch/prefix" "$scratch" || { echo "error: component $name fails alone"; return 1; }
@@ -57,6 +70,7 @@ check_deb() {
   local build=$1 scratch=$supple_root/build/deb package sources=/etc/apt/sources.list.d/debian.sources
   install_packages deb
   rm -rf "$scratch" && mkdir -p "$scratch"
+  cmake --build "$build" --target benchmarks || return 1
   (cd "$scratch" && cpack --config "$build/CPackConfig.cmake" -G DEB -B "$scratch/made") || return 1
   package=$(find "$scratch/made" -maxdepth 1 -name 'supple_*.deb')
   dpkg-deb --info "$package"
@@ -70,6 +84,7 @@ check_deb() {
     supple run two_balls --simulate-only --frames 1-4 --progress none
     supple view out/two_balls --progress none && test -s out/two_balls/two_balls_view.html
     supple check ball_hits_spiral
+    supple bench scenes/spiral_uncoils
     python3 -c "import supple; print(supple.library(\"two_balls\"))"
     test -s /usr/share/supple/blender/supple_import.py && test -s /usr/share/man/man1/supple.1'
   local result=$?
@@ -84,6 +99,7 @@ check_wheel() {
   rm -rf "$scratch"
   PYTHON=$python "$supple_root/scripts/wheel.sh" --build "$build" --out "$scratch" || return 1
   "$python" -m venv "$scratch/new" && "$scratch/new/bin/pip" install --quiet --disable-pip-version-check "$scratch"/supple-*.whl || return 1
+  check_benchmarks "$scratch/new/bin/supple" "$scratch" || return 1
   (cd "$scratch" && env -i PATH="$scratch/new/bin:/usr/bin:/bin" sh -eu -c '
     supple run two_balls --simulate-only --frames 1-4 --progress none
     supple view out/two_balls --progress none && test -s out/two_balls/two_balls_view.html

@@ -19,7 +19,7 @@ install_packages build run test
 if [[ $build == "$supple_root/build/release" ]]; then
   log=$supple_root/build/logs/stress_build.log
   mkdir -p "$(dirname "$log")"
-  targets=(stress supple_tool scenes_tests collision_tests implicit_tests core_tests core_stress contact_stress contact_invariance)
+  targets=(stress supple_tool scenes_tests collision_tests implicit_tests core_tests benchmarks)
   # A configured folder keeps its options.
   [[ -f $build/build.ninja ]] || cmake -S "$supple_root" --preset release -DSUPPLE_BUILD_TESTS=ON >"$log" 2>&1
   cmake --build "$build" --target "${targets[@]}" >>"$log" 2>&1 || { tail -n 40 "$log" && exit 1; }

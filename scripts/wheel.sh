@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Makes a Python wheel that carries the package, its libraries, the command line tool and the library scenes.
+# Makes a Python wheel that carries the package, its libraries, the command line tool, its benchmarks and the library scenes.
 #   scripts/wheel.sh [--build DIR] [--out DIR]
-#     --build DIR  take a finished build (with SUPPLE_BUILD_PYTHON=ON) instead of compiling
+#     --build DIR  take a finished build (with SUPPLE_BUILD_PYTHON=ON) instead of compiling; its benchmarks are built where they are not
 #     --out DIR    folder of the wheel (default: dist)
 # The wheel runs where glibc is as new as here; OpenGL (libosmesa6 or EGL) and ffmpeg are looked for on the machine that runs it.
 set -euo pipefail
@@ -35,7 +35,8 @@ pack_build() {
   "$tools/bin/python" -m wheel unpack --dest "$work/content" "$work"/raw/*.whl
   folder=$(echo "$work"/content/supple-*)
   info=$(echo "$folder"/supple-*.dist-info)
-  cmake --install "$build" --component wheel --prefix "$folder" >/dev/null
+  cmake --build "$build" --target benchmarks >/dev/null
+  cmake --install "$build" --component wheel --prefix "$folder" --strip >/dev/null
   mkdir -p "${info%.dist-info}.data/scripts"
   cp "$root/scenes/python/command/supple" "${info%.dist-info}.data/scripts/"
   module=$(basename "$folder"/supple/_supple.*.so)

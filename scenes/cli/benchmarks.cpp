@@ -42,16 +42,24 @@ constexpr std::array<Group, 15> kGroups{{
     {"render", "render_bench", "pictures: gl (1280 x 720, 200,000 triangles), path (640 x 360, to a given noise)", true},
 }};
 
-fs::path program_path(const Group& group) { return fs::read_symlink("/proc/self/exe").parent_path() / group.program; }
+/// The program of all benchmarks: beside the tool in a build and in the Python package, in libexec/supple where installed. Empty: none.
+fs::path benchmark_program() {
+  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+  for (const fs::path& program : {folder / "supple_bench", folder.parent_path() / "libexec/supple/supple_bench"}) {
+    if (fs::exists(program)) return program;
+  }
+  return {};
+}
 
 }  // namespace
 
 std::string list_benchmarks() {
+  const bool built = !benchmark_program().empty();
   std::string text;
   for (const Group& group : kGroups) {
     std::string line(group.name);
     line.resize(26, ' ');
-    line += fs::exists(program_path(group)) ? "built      " : "not built  ";
+    line += built ? "built      " : "not built  ";
     text += line.append(group.measures) + '\n';
   }
   return text;
@@ -73,20 +81,22 @@ void run_benchmark(const std::string& group, std::span<const std::string> argume
                                         .found = "'" + group + "'",
                                         .hint = "known: " + known + "; supple bench --list says what they measure"});
   }
-  const fs::path program = program_path(*found);
-  std::vector<std::string> words{program.string()};
+  const fs::path program = benchmark_program();
+  if (program.empty()) {
+    throw Error(ErrorKind::Io, Fault{.place = "supple_bench",
+                                     .key = {},
+                                     .expected = "expected the program of the benchmarks beside the tool or in libexec/supple",
+                                     .found = "none",
+                                     .hint = "in a source tree: cmake --build build/release --target benchmarks"});
+  }
+  std::vector<std::string> words{program.string(), std::string(found->program)};
   if (group.size() > found->name.size()) words.push_back(group.substr(found->name.size() + 1));
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   execv(program.c_str(), argv.data());
-  const bool absent = errno == ENOENT;
-  throw Error(ErrorKind::Io, Fault{.place = program.string(),
-                                   .key = {},
-                                   .expected = "expected the program of these benchmarks beside the tool",
-                                   .found = absent ? "none" : std::strerror(errno),
-                                   .hint = "in a source tree: cmake --build build/release --target benchmarks"});
+  throw Error(ErrorKind::Io, Fault{.place = program.string(), .key = {}, .expected = "cannot be started: " + std::string(std::strerror(errno)), .found = {}, .hint = {}});
 }
 
 }  // namespace supple::tool

@@ -529,7 +529,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   memory_flag(query_verb, a, "limit of memory for the scene, which is refused if it needs more (default: 8G)");
   query_verb->footer("Example: supple query contact scenes/library/contacts/two_balls.yaml --error 1e-6");
 
-  CLI::App* bench_verb = app.add_subcommand("bench", "run benchmarks of a source tree: time, size, error and hash");
+  CLI::App* bench_verb = app.add_subcommand("bench", "run benchmarks: time, size, error and hash");
   bench_verb->add_option("group", a.group, "group or group/name, e.g. core or core/melt; further arguments and options are passed to its program");
   bench_verb->allow_extras();
   bench_verb->add_flag("--list", a.list, "list the groups");

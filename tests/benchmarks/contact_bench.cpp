@@ -4,8 +4,6 @@
 /// form is given too (for the plane it is limited by the plane's stiffness, 1e9).
 ///   contact_bench [FILE.svg]
 /// With a file name contact_rules runs as well and plots time against error of all rules of the contact surface there.
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -16,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "programs.h"
 #include "supple/collision/contact_surface.h"
 #include "supple/core/hash.h"
 #include "supple/core/math.h"
@@ -110,7 +109,7 @@ void measure(const std::string& name, const std::vector<collision::ContactBody>&
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_bench(int argc, char** argv) {
   supple::benchmarks::answer_usage(argc, argv, "contact_bench [FILE.svg]    FILE.svg: plot of time against error of all rules, by contact_rules", 1);
   namespace fs = std::filesystem;
   const fs::path plot = argc > 1 ? argv[1] : "";
@@ -140,9 +139,5 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "plot of time against error, all rules: supple bench collision FILE.svg\n");
     return 0;
   }
-  const std::string rules = fs::read_symlink("/proc/self/exe").replace_filename("contact_rules");
-  std::fflush(stdout);
-  execl(rules.c_str(), rules.c_str(), argv[1], static_cast<char*>(nullptr));
-  std::fprintf(stderr, "error: %s: expected it beside this program; build the target benchmarks\n", rules.c_str());
-  return 4;
+  return supple::benchmarks::programs::contact_rules(argc, argv);
 }

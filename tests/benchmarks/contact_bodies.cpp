@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "contact_shapes.h"
+#include "programs.h"
 #include "supple/collision/react.h"
 #include "supple/implicit/solids.h"
 #include "usage.h"
@@ -102,7 +103,7 @@ struct Query {
       const double start = cpu_microseconds();
       solve_contact_surface(bodies, candidates, {.error = error, .energy = energy, .only = rule}, executor, surface);
       const double solved = cpu_microseconds();
-      react({bodies, {}, surface}, executor, {loads});
+      collision::react({bodies, {}, surface}, executor, {loads});
       cpu_us = std::min(cpu_us, solved - start);
       forces_us = std::min(forces_us, cpu_microseconds() - solved);
     }
@@ -155,7 +156,7 @@ void measure(std::string_view name, int poses, collision::ContactRule rule, std:
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_bodies(int argc, char** argv) {
   constexpr std::string_view kUsage = "contact_bodies [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--reference RULE]";
   answer_usage(argc, argv, kUsage, 6, {{"--reference", 1}});
   std::vector<std::string_view> words;

@@ -6,10 +6,11 @@
 #include <string_view>
 #include <vector>
 
+#include "programs.h"
 #include "scenes/contact_gas.h"
 #include "usage.h"
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_conservation(int argc, char** argv) {
   using namespace supple::scenes;
   using namespace supple::benchmarks;
   constexpr std::string_view kUsage = "contact_conservation [STEPS] [BALLS]";

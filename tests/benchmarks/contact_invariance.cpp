@@ -9,9 +9,10 @@
 #include <vector>
 
 #include "contact_views.h"
+#include "programs.h"
 #include "usage.h"
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_invariance(int argc, char** argv) {
   using namespace supple;
   using namespace supple::benchmarks;
   constexpr std::array<double, 4> kErrors{1e-2, 1e-3, 1e-6, 1e-10};

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "programs.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/hash.h"
 #include "supple/scenes/read_scene.h"
@@ -106,7 +107,7 @@ void measure(int count, bool sleeps, int threads) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_pile(int argc, char** argv) {
   using supple::benchmarks::whole_number;
   constexpr std::string_view kUsage = "contact_pile [BALLS ...] [--threads N]    from 10,000 balls on the last layer is filled";
   supple::benchmarks::answer_usage(argc, argv, kUsage, std::numeric_limits<std::size_t>::max(), {{"--threads", 1}});

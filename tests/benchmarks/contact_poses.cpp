@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "contact_cases.h"
+#include "programs.h"
 #include "supple/collision/react.h"
 #include "supple/core/hash.h"
 #include "usage.h"
@@ -67,7 +68,7 @@ struct Query {
     for (int i = 0; i < repeats; ++i) {
       constexpr int kInARow = 4;
       const double start = cpu_microseconds();
-      for (int n = 0; n < kInARow; ++n) react({bodies, {}, surface}, executor, {loads});
+      for (int n = 0; n < kInARow; ++n) collision::react({bodies, {}, surface}, executor, {loads});
       least = std::min(least, (cpu_microseconds() - start) / kInARow);
     }
     return least;
@@ -161,7 +162,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_poses(int argc, char** argv) {
   constexpr std::string_view kUsage = "contact_poses [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]";
   answer_usage(argc, argv, kUsage, 9, {{"--all-rays"}, {"--marched"}, {"--depths", 2}});
   std::vector<std::string_view> words;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "contact_shapes.h"
+#include "programs.h"
 #include "usage.h"
 
 namespace {
@@ -169,7 +170,7 @@ void measure_rings() {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_rules(int argc, char** argv) {
   supple::benchmarks::answer_usage(argc, argv, "contact_rules [FILE.svg]", 1);
   constexpr double kRadius = 0.1, kSpacing = 0.03, kE = 1e6, kDepth = 0.1 * kRadius;
   constexpr double kWidth = 360.0, kHeight = 320.0, kLeft = 60.0, kTop = 40.0;

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "programs.h"
 #include "scenes/contact_stress.h"
 #include "usage.h"
 
@@ -82,7 +83,7 @@ void draw(const std::vector<Block>& blocks, const std::string& file) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_stress(int argc, char** argv) {
   constexpr std::string_view kUsage = "contact_stress [--seed N] [FILE.svg]";
   supple::benchmarks::answer_usage(argc, argv, kUsage, 3, {{"--seed", 1}});
   std::string map;

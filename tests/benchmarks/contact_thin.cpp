@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include "programs.h"
 #include "thin_cases.h"
 #include "usage.h"
 
@@ -149,7 +150,7 @@ void measure_leaning(int poses, std::uint64_t seed) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::contact_thin(int argc, char** argv) {
   constexpr std::string_view kUsage = "contact_thin [POSES] [SEED]";
   answer_usage(argc, argv, kUsage, 2);
   const int poses = argc > 1 ? whole_number(kUsage, argv[1]) : 300;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/support.h"
+#include "programs.h"
 #include "supple/core/integrate.h"
 #include "supple/core/lennard_jones.h"
 #include "usage.h"
@@ -164,7 +165,7 @@ const char* colour(Outcome outcome) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::core_stress(int argc, char** argv) {
   supple::benchmarks::answer_usage(argc, argv, "core_stress [FILE.svg]", 1);
   constexpr double kCell = 14.0;
   std::string svg;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "benchmarks/field_bodies.h"
+#include "programs.h"
 #include "supple/core/hash.h"
 #include "supple/core/math.h"
 #include "supple/implicit/field.h"
@@ -199,7 +200,7 @@ void measure_few(std::string_view filter, std::uint32_t count, ShapeKind shape) 
 }  // namespace
 
 /// @param argv  beginning of the names to run, e.g. w3/values; all when absent
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::field_bench(int argc, char** argv) {
   constexpr std::string_view kUsage = "field_bench [PREFIX]    prefix of the names to run, e.g. w3/values";
   supple::benchmarks::answer_usage(argc, argv, kUsage, 1);
   const std::string_view filter = argc > 1 ? argv[1] : "";

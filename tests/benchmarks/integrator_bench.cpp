@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/support.h"
+#include "programs.h"
 #include "supple/core/arrange.h"
 #include "supple/core/hash.h"
 #include "supple/core/integrators.h"
@@ -169,7 +170,7 @@ class Panel {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::integrator_bench(int argc, char** argv) {
   supple::benchmarks::answer_usage(argc, argv, "integrator_bench [FILE.svg]", 1);
   std::string svg;
   double left = 50.0;

@@ -28,6 +28,7 @@
 #include "field/field_index.h"
 #include "mesh/blob_grid.h"
 #include "mesh/cubes/march_sampling.h"
+#include "programs.h"
 #include "supple/core/hash.h"
 #include "supple/implicit/creases.h"
 #include "supple/implicit/march_cubes.h"
@@ -559,7 +560,7 @@ bool starts_alike(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::mesh_bench(int argc, char** argv) {
   using supple::benchmarks::whole_number;
   constexpr std::array<std::string_view, 6> kBodies{"w1", "w2", "w3", "w4", "capsules", "united"};
   constexpr std::string_view kUsage =

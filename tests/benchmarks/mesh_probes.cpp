@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "contact_shapes.h"
+#include "programs.h"
 #include "support/closed_meshes.h"
 #include "supple/core/io/read_mesh.h"
 #include "supple/implicit/mesh_solid.h"
@@ -116,7 +117,7 @@ void probe(const Named& named, int count) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::mesh_probes(int argc, char** argv) {
   constexpr std::string_view kUsage = "mesh_probes [PROBES] [FILE.obj|.ply ...]";
   answer_usage(argc, argv, kUsage, 1000);
   const int count = argc > 1 ? whole_number(kUsage, argv[1]) : 200;

@@ -20,6 +20,7 @@
 
 #include "implicit/analytic_fields.h"
 #include "mesh/delaunay/patch_complex.h"
+#include "programs.h"
 #include "supple/core/content_versions.h"
 #include "supple/core/hash.h"
 #include "supple/implicit/delaunay.h"
@@ -296,7 +297,7 @@ void moved(int count, double cell, double error) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::partition_bench(int argc, char** argv) {
   using supple::benchmarks::expect_word;
   using supple::benchmarks::positive_number;
   using supple::benchmarks::whole_number;

@@ -20,6 +20,7 @@
 #include <thread>
 #include <vector>
 
+#include "programs.h"
 #include "render/shapes.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
@@ -196,7 +197,7 @@ int write_studio(const fs::path& folder) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int supple::benchmarks::programs::render_bench(int argc, char** argv) {
   using supple::benchmarks::positive_number;
   constexpr std::string_view usage = "render_bench [gl] | rate [AT_ONCE] [NOISE] | path [NOISE] [OUT.png] | studio FOLDER";
   supple::benchmarks::answer_usage(argc, argv, usage, 3);

@@ -2,9 +2,10 @@
 /// Whole scenes at one accuracy, one JSON object a line: CPU time of a simulated second, its shares by stage, and what positions are off by, over the size of
 /// their objects. The reference has steps 16 times as short and a 16th of the error of contact. Errors are told up to the first frame at which a second
 /// reference, with factors of 8, is away from it by more than a tenth of the accuracy: what follows is chaos.
-///   scene_bench [NAME ...] [--accuracy A ...] [--set path.to.key=value ...]
+///   scene_bench [NAME ...] [--accuracy A ...] [--set path.to.key=value ...] [--skips]
 /// All scenes where none is named; --accuracy 0.01 by default; of several, all are compared with the references of the finest. Keys are set in runs and
-/// references alike. Scenes are simulated for as long as keeps each one to minutes.
+/// references alike. Scenes are simulated for as long as keeps each one to minutes. With --skips there is no reference: CPU times with all skips and
+/// without any, and whether the states are equal to the bit; the exit code is 1 where they are not.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -15,8 +16,10 @@
 #include <string_view>
 #include <vector>
 
+#include "programs.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
+#include "supple/core/hash.h"
 #include "supple/scenes/accuracy.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
@@ -30,28 +33,29 @@ namespace fs = std::filesystem;
 
 struct Case {
   std::string_view name;
-  std::string_view file;  ///< in the source tree
+  std::string_view file;  ///< of the library; without a folder: of the benchmarks
   double seconds;         ///< simulated of it
 };
 
 constexpr Case kCases[] = {
-    {"jelly", "tests/benchmarks/scenes/jelly_stairs.yaml", 2.0},
-    {"letter", "tests/benchmarks/scenes/letter_s.yaml", 1.0},
-    {"chain", "tests/benchmarks/scenes/chain_hit.yaml", 1.0},
-    {"ball_hits_spiral", "scenes/library/figures/ball_hits_spiral.yaml", 2.0},
-    {"spiral_uncoils", "scenes/library/figures/spiral_uncoils.yaml", 4.0},
-    {"pile_rests", "scenes/library/contacts/pile_rests.yaml", 0.5},
-    {"hand_closes", "scenes/library/objects/hand_closes.yaml", 0.25},
-    {"shell_dents", "scenes/library/objects/shell_dents.yaml", 1.0},
-    {"plate_breaks", "scenes/library/objects/plate_breaks.yaml", 1.0},
-    {"slide", "scenes/library/contacts/slide_on_incline.yaml", 1.0},
-    {"cradle", "scenes/library/contacts/newtons_cradle.yaml", 2.0},
-    {"ball_in_ring", "scenes/library/contacts/ball_in_ring.yaml", 0.4},
+    {"jelly", "jelly_stairs.yaml", 2.0},
+    {"letter", "letter_s.yaml", 1.0},
+    {"chain", "chain_hit.yaml", 1.0},
+    {"ball_hits_spiral", "figures/ball_hits_spiral.yaml", 2.0},
+    {"spiral_uncoils", "figures/spiral_uncoils.yaml", 4.0},
+    {"pile_rests", "contacts/pile_rests.yaml", 0.5},
+    {"hand_closes", "objects/hand_closes.yaml", 0.25},
+    {"shell_dents", "objects/shell_dents.yaml", 1.0},
+    {"plate_breaks", "objects/plate_breaks.yaml", 1.0},
+    {"slide", "contacts/slide_on_incline.yaml", 1.0},
+    {"cradle", "contacts/newtons_cradle.yaml", 2.0},
+    {"ball_in_ring", "contacts/ball_in_ring.yaml", 0.4},
 };
 
 struct Settings {
   std::vector<double> accuracy;  ///< coarsest first
   std::vector<std::string> overrides;
+  bool skips = false;            ///< measure what these save
 };
 
 /// One run.
@@ -63,9 +67,23 @@ struct Motion {
   std::uint64_t steps = 0;
   double seconds = 0.0;
   std::string method;
+  std::string hash;                          ///< of the last state
 };
 
-fs::path source_file(const Case& c) { return fs::path(SUPPLE_SOURCE_DIR) / c.file; }
+/// From the place of the program: installed, in the Python package, or in the source tree. @throws Error{Io} where it is in none
+fs::path source_file(const Case& c) {
+  const fs::path program = fs::read_symlink("/proc/self/exe"), above = program.parent_path().parent_path(), root = above.parent_path();
+  const bool own = !fs::path(c.file).has_parent_path();
+  const fs::path shipped = own ? "scenes/benchmarks" : "scenes/library";
+  for (const fs::path& folder : {root / "share/supple" / shipped, above / shipped, root.parent_path() / (own ? "tests/benchmarks/scenes" : shipped)}) {
+    if (fs::exists(folder / c.file)) return folder / c.file;
+  }
+  throw Error(ErrorKind::Io, Fault{.place = program.string(),
+                                   .key = {},
+                                   .expected = "expected " + (shipped / c.file).string() + " in share/supple of the installation, or in the source tree of the build",
+                                   .found = "none",
+                                   .hint = {}});
+}
 
 Scene scene_of(const Case& c, const Settings& settings, double accuracy) {
   std::vector<std::string> set{"accuracy=" + std::to_string(accuracy)};
@@ -76,12 +94,12 @@ Scene scene_of(const Case& c, const Settings& settings, double accuracy) {
 }
 
 /// @param finer  halvings of every step; the error of contact is divided by as much
-Motion run(const Case& c, const Settings& settings, double accuracy, int finer) {
+Motion run(const Case& c, const Settings& settings, double accuracy, int finer, bool skip = true) {
   Scene scene = scene_of(c, settings, accuracy);
   scene.contact.error = std::max(1e-10, std::ldexp(contact_error(scene), -finer));
   scene.time_step.max_substeps = 1048576;
   const int frames = std::min(scene.frame_count(), 1 + static_cast<int>(std::lround(c.seconds * scene.frame_rate)));
-  Simulation simulation(std::move(scene), {.threads = 1, .profile = false, .finer = finer});
+  Simulation simulation(std::move(scene), {.threads = 1, .skip = skip, .profile = false, .finer = finer});
   Motion motion;
   motion.method = simulation.integrator().reason;
   motion.positions.push_back(simulation.state().particles.position);
@@ -95,6 +113,7 @@ Motion run(const Case& c, const Settings& settings, double accuracy, int finer) 
   motion.cpu_s = process_cpu_seconds() - begin;
   motion.steps = simulation.state().steps;
   motion.seconds = simulation.time();
+  motion.hash = to_hex(simulation.state_hash());
   const Profile profile = simulation.profile();
   double contact = 0.0, all = 0.0;
   for (const StageInfo& stage : stage_table()) {
@@ -157,6 +176,20 @@ void report(const Case& c, const Settings& settings, const Model& model, double 
   std::fflush(stdout);
 }
 
+/// One line for each accuracy; whether all states are equal.
+bool compare_skips(const Case& c, const Settings& settings) {
+  bool same = true;
+  for (const double accuracy : settings.accuracy) {
+    const Motion with = run(c, settings, accuracy, 0), without = run(c, settings, accuracy, 0, false);
+    same = same && with.hash == without.hash;
+    std::printf("{\"scene\": \"%.*s\", \"accuracy\": %g, \"cpu_s_per_s\": %.4g, \"cpu_s_per_s_without_skips\": %.4g, \"states_equal\": %s, \"hash\": \"%s\"}\n",
+                static_cast<int>(c.name.size()), c.name.data(), accuracy, with.cpu_s / with.seconds, without.cpu_s / without.seconds,
+                with.hash == without.hash ? "true" : "false", with.hash.c_str());
+    std::fflush(stdout);
+  }
+  return same;
+}
+
 void bench(const Case& c, const Settings& settings) {
   const double finest = settings.accuracy.back();
   const Model model = build_model(scene_of(c, settings, finest));
@@ -166,9 +199,9 @@ void bench(const Case& c, const Settings& settings) {
 
 }  // namespace
 
-int main(int argc, char** argv) try {
-  constexpr std::string_view kUsage = "scene_bench [NAME ...] [--accuracy A ...] [--set path.to.key=value ...]    all scenes where none is named";
-  supple::benchmarks::answer_usage(argc, argv, kUsage, std::numeric_limits<std::size_t>::max(), {{"--accuracy", 1}, {"--set", 1}});
+int supple::benchmarks::programs::scene_bench(int argc, char** argv) try {
+  constexpr std::string_view kUsage = "scene_bench [NAME ...] [--accuracy A ...] [--set path.to.key=value ...] [--skips]    all scenes where none is named";
+  supple::benchmarks::answer_usage(argc, argv, kUsage, std::numeric_limits<std::size_t>::max(), {{"--accuracy", 1}, {"--set", 1}, {"--skips"}});
   Settings settings;
   std::vector<std::string_view> names;
   for (int i = 1; i < argc; ++i) {
@@ -177,6 +210,8 @@ int main(int argc, char** argv) try {
       const char* value = argv[++i];
       if (word == "--set") settings.overrides.emplace_back(value);
       if (word == "--accuracy") settings.accuracy.push_back(supple::benchmarks::positive_number(kUsage, value));
+    } else if (word == "--skips") {
+      settings.skips = true;
     } else {
       names.push_back(word);
     }
@@ -190,15 +225,21 @@ int main(int argc, char** argv) try {
     std::fprintf(stderr, "scene_bench: expected one of %s, found '%.*s'\n", known.c_str(), static_cast<int>(name.size()), name.data());
     return 2;
   }
+  bool good = true;
   for (const Case& c : kCases) {
     if (!names.empty() && std::find(names.begin(), names.end(), c.name) == names.end()) continue;
     try {
-      bench(c, settings);
+      if (settings.skips) {
+        good = compare_skips(c, settings) && good;
+      } else {
+        bench(c, settings);
+      }
     } catch (const Error& error) {
       std::printf("{\"scene\": \"%.*s\", \"failed\": \"%s\"}\n", static_cast<int>(c.name.size()), c.name.data(), error.what());
+      good = false;
     }
   }
-  return 0;
+  return good ? 0 : 1;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "scene_bench: %s\n", error.what());
   return 1;

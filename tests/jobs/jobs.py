@@ -2,10 +2,11 @@
 """Job files of `supple job` run by their engines on this machine: every file is that of one process, a killed task or node loses nothing, nothing is
 left running. Prints figures of overhead.
 
-usage: jobs.py SUPPLE SCRATCH [--frames N] [ROW ...]     rows: overhead openjd slurm ray (all where none is named)
+usage: jobs.py SUPPLE SCRATCH [--frames N] [ROW ...]     rows: overhead openjd slurm ray sweep (all where none is named)
 openjd-cli and ray are found beside the Python that runs this; Slurm on the search path. A row without its engine fails.
 """
 import argparse
+import contextlib
 import hashlib
 import os
 import pathlib
@@ -32,7 +33,11 @@ objects:
 camera: {{from: [0, -3, 1], look_at: [0, 0, 0.4]}}
 output: {{images: {{size: [64, 48], samples: 1}}, film: true}}
 """
+REWRITTEN = re.compile(r"^table\.csv$|\.lock$|^logs/")  # by a second call of a sweep
 REPORTS = re.compile(r"^(result|render)\.json$|^\.lock$|^logs/")
+
+
+RAY_MEMORY = 100 * 2**20  # [bytes] of the object store of a node
 
 
 class Failed(Exception):
@@ -96,10 +101,10 @@ class Jobs:
         if left:
             raise Failed(f"still running: {left}")
 
-    def times_again(self, out, call):
-        """Seconds of a second call, which must change nothing."""
+    def times_again(self, out, call, reports=REPORTS):
+        """Seconds of a second call, which must change nothing but reports."""
         def written():
-            return {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file() and not REPORTS.match(str(path.relative_to(out)))}
+            return {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file() and not reports.match(str(path.relative_to(out)))}
 
         before, begin = written(), time.monotonic()
         call()
@@ -142,18 +147,9 @@ class Jobs:
 
     def slurm(self):
         out, file = self.job("slurm", max(1, self.frames // 20))
-        host = subprocess.Popen([HERE / "slurm_host.sh", str(self.scratch.parent / "slurm"), "2"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        try:
-            variable = host.stdout.readline().strip()
-            if not variable:
-                raise Failed("slurm: it does not start")
-            environment = {**os.environ, **dict([variable.split("=", 1)])}
-
+        with self.slurm_host() as environment:
             def submit(meanwhile=lambda: None):
-                self.call(file, program="bash", environment=environment)
-                while self.call("--noheader", program="squeue", environment=environment).strip():
-                    meanwhile()
-                    time.sleep(0.05)
+                self.submit_to_slurm(file, environment, meanwhile)
 
             killed = []
 
@@ -173,42 +169,100 @@ class Jobs:
             again = self.times_again(out, submit)
             print(f"slurm: 22 tasks in {seconds:.1f} s, one killed and the job submitted again, {seconds / self.serial_s:.2f} of one process; again, with all there, {again:.1f} s,"
                   f" {again / 36:.2f} % of an hour")
+
+    @contextlib.contextmanager
+    def slurm_host(self):
+        """Environment of the commands of a Slurm of this machine alone."""
+        host = subprocess.Popen([HERE / "slurm_host.sh", str(self.scratch.parent / "slurm"), "2"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        try:
+            variable = host.stdout.readline().strip()
+            if not variable:
+                raise Failed("slurm: it does not start")
+            yield {**os.environ, **dict([variable.split("=", 1)])}
         finally:
             host.stdin.close()
             host.wait()
 
-    def ray(self):
+    def submit_to_slurm(self, file, environment, meanwhile=lambda: None):
+        """Until nothing of it is in the queue."""
+        self.call(file, program="bash", environment=environment)
+        while self.call("--noheader", program="squeue", environment=environment).strip():
+            meanwhile()
+            time.sleep(0.05)
+
+    @contextlib.contextmanager
+    def ray_cluster(self):
+        """A cluster of Ray of one node with one CPU."""
         import ray
         from ray.cluster_utils import Cluster
-        out, file = self.job("ray", max(1, self.frames // 50))
-        memory = 100 * 2**20
-        cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False, "object_store_memory": memory})
-        driver = None
+        cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False, "object_store_memory": RAY_MEMORY})
         try:
-            second = cluster.add_node(num_cpus=1, object_store_memory=memory)
-            begin = time.monotonic()
-            driver = subprocess.Popen([sys.executable, str(file), "--address", cluster.address], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-            drawn = 0
-            while drawn < self.frames // 3:
-                if driver.poll() is not None:
-                    raise Failed(f"ray: {driver.communicate()[1][-2000:]}")
-                time.sleep(0.02)
-                drawn = len(list((out / "frames").glob("*.png")))
-            cluster.remove_node(second, allow_graceful=False)
-            _, errors = driver.communicate(timeout=3600)
-            if driver.returncode:
-                raise Failed(f"ray: exit {driver.returncode}: {errors[-2000:]}")
-            seconds = time.monotonic() - begin
-            self.compare(out)
-            again = self.times_again(out, lambda: self.call(file, "--address", cluster.address, program=sys.executable))
-            print(f"ray: two nodes, one killed after {drawn} of {self.frames} frames: 52 tasks in {seconds:.1f} s, {seconds / self.serial_s:.2f} of one process;"
-                  f" again, with all there, {again:.1f} s, {again / 36:.2f} % of an hour")
+            yield cluster
         finally:
-            if driver and driver.poll() is None:
-                driver.kill()
-                driver.communicate()
             ray.shutdown()
             cluster.shutdown()
+
+    def ray(self):
+        out, file = self.job("ray", max(1, self.frames // 50))
+        driver = None
+        with self.ray_cluster() as cluster:
+            try:
+                second = cluster.add_node(num_cpus=1, object_store_memory=RAY_MEMORY)
+                begin = time.monotonic()
+                driver = subprocess.Popen([sys.executable, str(file), "--address", cluster.address], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                drawn = 0
+                while drawn < self.frames // 3:
+                    if driver.poll() is not None:
+                        raise Failed(f"ray: {driver.communicate()[1][-2000:]}")
+                    time.sleep(0.02)
+                    drawn = len(list((out / "frames").glob("*.png")))
+                cluster.remove_node(second, allow_graceful=False)
+                _, errors = driver.communicate(timeout=3600)
+                if driver.returncode:
+                    raise Failed(f"ray: exit {driver.returncode}: {errors[-2000:]}")
+                seconds = time.monotonic() - begin
+                self.compare(out)
+                again = self.times_again(out, lambda: self.call(file, "--address", cluster.address, program=sys.executable))
+                print(f"ray: two nodes, one killed after {drawn} of {self.frames} frames: 52 tasks in {seconds:.1f} s, {seconds / self.serial_s:.2f} of one process;"
+                      f" again, with all there, {again:.1f} s, {again / 36:.2f} % of an hour")
+            finally:
+                if driver and driver.poll() is None:
+                    driver.kill()
+                    driver.communicate()
+
+    def sweep(self):
+        """A sweep of six points by each engine: rows and table of one process, nothing written by a second call, another plan refused."""
+        def results(folder):
+            return {path.relative_to(folder): path.read_bytes() for path in [folder / "table.csv", *folder.glob("*/row.json")]}
+
+        def plan(folder, *more):
+            self.call("sweep", self.scene, "--set", "duration=0.5", "--set", "objects.ball.contact.modulus=1e3:1e5:log3", "--set", "objects.ball.particles.mass=[1, 2]",
+                      "--out", folder, "--progress", "none", "--quiet", *more)
+
+        alone = self.scratch / "sweep alone"
+        plan(alone)
+        expected = results(alone)
+        with self.slurm_host() as slurm, self.ray_cluster() as cluster:
+            engines = {"openjd": lambda file: self.call("run", file, program=pathlib.Path(sys.executable).parent / "openjd"),
+                       "slurm": lambda file: self.submit_to_slurm(file, slurm),
+                       "ray": lambda file: self.call(file, "--address", cluster.address, program=sys.executable)}
+            for engine, run in engines.items():
+                folder, file = self.scratch / f"{engine} sweep", (self.scratch / f"{engine} sweep job").with_suffix(".json")
+                plan(folder, "--plan-only")
+                self.call("job", folder, "--format", engine, "--out", file, "--threads", 1, "--program", self.supple)
+                begin = time.monotonic()
+                run(file)
+                seconds = time.monotonic() - begin
+                if len(expected) != 7 or results(folder) != expected:
+                    raise Failed(f"{folder}: rows and table are not those of one process")
+                again = self.times_again(folder, lambda: run(file), REWRITTEN)
+                left = running(str(folder))
+                if left:
+                    raise Failed(f"still running: {left}")
+                print(f"sweep by {engine}: 6 points and a table in {seconds:.1f} s; again, with all there, {again:.1f} s", flush=True)
+        other = subprocess.run([self.supple, "sweep", alone, "--point", "1", "--fingerprint", "0" * 16], capture_output=True, text=True)
+        if other.returncode != 3 or "fingerprint" not in other.stderr:
+            raise Failed(f"a plan of another fingerprint: exit {other.returncode}: {other.stderr}")
 
 
 def main():
@@ -217,8 +271,8 @@ def main():
     parser.add_argument("scratch", type=lambda text: pathlib.Path(text).resolve())
     parser.add_argument("rows", nargs="*", metavar="ROW")
     parser.add_argument("--frames", type=int, default=1000)
-    arguments = parser.parse_args()
-    rows = arguments.rows or ["overhead", "openjd", "slurm", "ray"]
+    arguments = parser.parse_intermixed_args()
+    rows = arguments.rows or ["overhead", "openjd", "slurm", "ray", "sweep"]
     jobs, failures = Jobs(arguments.supple, arguments.scratch, arguments.frames), 0
     for row in rows:
         try:

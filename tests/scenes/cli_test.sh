@@ -29,6 +29,11 @@ sed -i 's/duration: 0.2 s/duration: 20 s/' diverges.yaml
 sed 's/time_step: {substeps: 1}/time_step: {max_substeps: 2}/' diverges.yaml > too_fine.yaml
 echo 'a plain file' > plain_file
 
+fault() {
+  echo "$*"
+  failures=$((failures + 1))
+}
+
 # expect CODE WORDS COMMAND...: exit code and words that standard error must hold.
 expect() {
   local code=$1 words=$2
@@ -104,12 +109,17 @@ expect 2 'collision/poses, collision/invariance' bench collision/posess
 # Programs of benchmarks get what follows their names, options too, in its order.
 mkdir bin
 ln "$supple" bin/supple 2> err.txt || cp "$supple" bin/supple
-printf '#!/bin/sh\necho "$@"\n' > bin/contact_stress
-chmod +x bin/contact_stress
-if [[ $(bin/supple bench collision/stability --seed 7 map.svg) != '--seed 7 map.svg' ]]; then
-  echo 'bench collision/stability --seed 7 map.svg: expected these words for its program'
-  failures=$((failures + 1))
-fi
+bin/supple bench core 2> err.txt
+[[ $? == 4 ]] && grep -qF 'libexec/supple' err.txt || fault "bench core without its program: $(cat err.txt)"
+bin/supple bench --list | grep -q 'core/stability  *not built' || fault 'bench --list: expected no programs'
+for folder in bin libexec/supple; do
+  mkdir -p "$folder"
+  printf '#!/bin/sh\necho "$@"\n' > "$folder/supple_bench"
+  chmod +x "$folder/supple_bench"
+  [[ $(bin/supple bench collision/stability --seed 7 map.svg) == 'contact_stress --seed 7 map.svg' ]] || fault 'bench collision/stability --seed 7 map.svg: expected these words for its program'
+  bin/supple bench --list | grep -q 'core/stability  *built' || fault 'bench --list: expected programs'
+  rm "$folder/supple_bench"
+done
 expect 5 'diverged at step' run diverges.yaml --out diverged --progress none
 expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none
 expect 6 'time_step.max_substeps' check too_fine.yaml
@@ -165,11 +175,6 @@ if "$supple" reference > /dev/full 2> err.txt || ! grep -qF 'standard output' er
   echo 'output that could not be written was not missed'
   failures=$((failures + 1))
 fi
-
-fault() {
-  echo "$*"
-  failures=$((failures + 1))
-}
 
 # Files that scenes name are regular ones, inside their folder.
 mkfifo pipe.csv

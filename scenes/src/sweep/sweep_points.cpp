@@ -20,6 +20,7 @@
 #include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/child_process.h"
+#include "supple/scenes/job.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
 #include "supple/scenes/sweep.h"
@@ -76,18 +77,16 @@ void write_row(const PointFiles& files, const SweepRow& row, const ordered_json&
 }
 
 /// Of everything that the row follows from: the build, the scene with its frames, what is written and measured.
-std::string fingerprint_of(const SweepPlan& plan, const Scene& scene) {
+std::string row_fingerprint(const SweepPlan& plan, const Scene& scene) {
   Hasher hasher;
   hasher.add(std::string_view(program_identity()));
-  hasher.add(scene.content_hash);
-  hasher.add(static_cast<std::uint64_t>(scene.frame_count()));
-  if (plan.outputs) hasher.add(scene.picture_hash);
+  hasher.add(std::string_view(fingerprint_of(scene, plan.outputs)));
   hasher.add(std::string_view(plan.measures));
   return to_hex(hasher.value());
 }
 
 /// Of a scene that cannot be read: of what is said about it.
-std::string fingerprint_of(const Error& error) {
+std::string row_fingerprint(const Error& error) {
   Hasher hasher;
   hasher.add(std::string_view(program_identity()));
   hasher.add(std::string_view(error.what()));
@@ -106,11 +105,11 @@ Prepared prepare(const SweepPlan& plan, const SweepPoint& point) {
   Prepared out;
   try {
     out.scene = read_scene(plan.scene, point.set, plan.allowed);
-    out.fingerprint = fingerprint_of(plan, *out.scene);
+    out.fingerprint = row_fingerprint(plan, *out.scene);
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::Scene) throw;
     out.faults = error.what();
-    out.fingerprint = fingerprint_of(error);
+    out.fingerprint = row_fingerprint(error);
   }
   return out;
 }

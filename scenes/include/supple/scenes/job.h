@@ -28,8 +28,9 @@ struct JobOptions {
   int threads = 4;                   ///< threads of a task, and processors that it asks for, >= 1
 };
 
-/// 16 hexadecimal digits of all keys that act on motion and pictures, of the files they name and of the number of frames.
-[[nodiscard]] std::string fingerprint_of(const Scene& scene);
+/// 16 hexadecimal digits of all keys that act on motion, of the files they name and of the number of frames.
+/// @param pictures  and of keys that act on pictures; fingerprints of jobs have them
+[[nodiscard]] std::string fingerprint_of(const Scene& scene, bool pictures = true);
 /// @throws Error{Scene} where the scene has another fingerprint
 void expect_fingerprint(const Scene& scene, const std::string& fingerprint);
 

@@ -1,4 +1,4 @@
-#include "output/job_scripts.h"
+#include "sweep/job_scripts.h"
 
 namespace supple::scenes {
 namespace {

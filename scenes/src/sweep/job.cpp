@@ -8,13 +8,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "output/job_scripts.h"
 #include "output/spare_memory.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "sweep/job_scripts.h"
 
 namespace supple::scenes {
 namespace {
@@ -245,10 +245,10 @@ std::string job_text(const Commands& job, const JobOptions& options) {
 
 }  // namespace
 
-std::string fingerprint_of(const Scene& scene) {
+std::string fingerprint_of(const Scene& scene, bool pictures) {
   Hasher hasher;
   hasher.add(scene.content_hash);
-  hasher.add(scene.picture_hash);
+  if (pictures) hasher.add(scene.picture_hash);
   hasher.add(static_cast<std::uint64_t>(scene.frame_count()));
   return to_hex(hasher.value());
 }

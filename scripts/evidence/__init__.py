@@ -1,0 +1,1 @@
+"""What scripts/evidence.sh measures and draws."""
