@@ -14,9 +14,10 @@ declare -A supple_packages=(
   [check]="clang clang-tidy"
   [docs]="doxygen python3-venv"
   [deb]="dpkg-dev mmdebstrap"
+  [data]="libcgal-demo"
 )
 declare -A supple_purpose=(
-  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, and Delaunay meshes" [python]="for the Python package" [check]="for the second compiler and static analysis" [docs]="for the documentation site" [deb]="to try the Debian package"
+  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, Delaunay meshes and fits" [python]="for the Python package" [check]="for the second compiler and static analysis" [docs]="for the documentation site" [deb]="to try the Debian package" [data]="data to fit"
 )
 
 # missing_packages NAME...: prints those that dpkg does not list as installed.

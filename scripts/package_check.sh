@@ -2,10 +2,10 @@
 # Checks the installed package from a minimal external project. Sourced.
 
 # Dependencies of each component beyond those of the components it needs: CMake packages, and libraries found by file.
-declare -A component_packages=([core]="Eigen3 TBB hwy" [implicit]="" [cgal]="" [collision]="" [render]="OpenEXR" [scenes]="yaml-cpp")
-declare -A component_libraries=([core]="" [implicit]="openvdb" [cgal]="gmp mpfr" [collision]="" [render]="deflate embree3" [scenes]="")
+declare -A component_packages=([core]="Eigen3 TBB hwy" [implicit]="" [cgal]="" [collision]="" [render]="OpenEXR" [scenes]="yaml-cpp" [fit]="")
+declare -A component_libraries=([core]="" [implicit]="openvdb" [cgal]="gmp mpfr" [collision]="" [render]="deflate embree3" [scenes]="" [fit]="")
 declare -A component_needs=([core]="" [implicit]="core" [cgal]="core implicit" [collision]="core implicit" [render]="core"
-  [scenes]="core implicit collision render")
+  [scenes]="core implicit collision render" [fit]="core implicit cgal")
 
 # check_component NAME PREFIX SCRATCH: builds and runs tests/package/component against one component, with all libraries hidden that it does not need.
 check_component() {
@@ -49,7 +49,7 @@ check_package() {
     [[ -n $(find "$scratch/prefix" -name "$name") ]] || { echo "error: $name is not installed"; return 1; }
   done
   check_benchmarks "$scratch/prefix/bin/supple" "$scratch" || return 1
-  for name in core implicit cgal collision render scenes; do
+  for name in core implicit cgal collision render scenes fit; do
     [[ -f $(find "$scratch/prefix" -name "supple_${name}Targets.cmake") ]] || continue
     check_component "$name" "$scratch/prefix" "$scratch" || { echo "error: component $name fails alone"; return 1; }
   done

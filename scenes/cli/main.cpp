@@ -21,6 +21,7 @@
 
 #include "benchmarks.h"
 #include "describe.h"
+#include "fit.h"
 #include "job.h"
 #include "last_resort.h"
 #include "library.h"
@@ -481,6 +482,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
   sweep_arguments.quiet = silent;
   CLI::App* sweep_verb = tool::add_sweep(app, sweep_arguments);
 
+  tool::FitArguments fit_arguments;
+  fit_arguments.quiet = silent;
+  CLI::App* fit_verb = tool::add_fit(app, fit_arguments);
+
   tool::JobArguments job_arguments;
   CLI::App* job_verb = tool::add_job(app, job_arguments);
 
@@ -569,6 +574,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
   if (view_verb->parsed()) {
     heed_signals();
     return tool::view(view_arguments, interrupted);
+  }
+  if (fit_verb->parsed()) {
+    heed_signals();
+    return tool::fit(fit_arguments);
   }
   if (job_verb->parsed()) return tool::write_job(job_arguments);
   if (sweep_verb->parsed()) {

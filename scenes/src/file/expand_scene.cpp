@@ -47,6 +47,28 @@ class Includes {
   Includes(const FileAccess& files, SourceTexts& texts, Tree& tree, FaultList& faults)
       : files_(files), texts_(texts), tree_(tree), faults_(faults) {}
 
+  /// The scene whose items of lists, too, have the keys of the files that they include.
+  Node* merge_all(Node* root, const std::filesystem::path& folder) {
+    Node* out = merge(root, folder);
+    for (std::size_t i = 0; i < out->entries.size(); ++i) {
+      const Node& list = *out->entries[i].value;
+      const auto includes = [](const Node* item) { return item->kind == Node::Kind::Mapping && item->find("include") != nullptr; };
+      if (list.kind != Node::Kind::List || std::none_of(list.items.begin(), list.items.end(), includes)) continue;
+      Node* items = tree_.copy(list);
+      for (Node*& item : items->items) {
+        if (includes(item)) item = merge(item, folder);
+      }
+      measure(*items);
+      if (out == root) out = tree_.copy(*root);
+      out->entries[i].value = items;
+    }
+    measure(*out);
+    return out;
+  }
+
+ private:
+  static constexpr std::string_view kKey[] = {"include"};
+
   Node* merge(Node* root, const std::filesystem::path& folder) {
     const Node::Entry* entry = root->find("include");
     if (entry == nullptr) return root;
@@ -56,7 +78,6 @@ class Includes {
     } else {
       names.push_back(entry->value);
     }
-    constexpr std::string_view kKey[] = {"include"};
     Node* out = without(*root, kKey, tree_);
     // The last one wins over those before it, and the file itself over all.
     for (auto name = names.rbegin(); name != names.rend(); ++name) {
@@ -66,7 +87,6 @@ class Includes {
     return out;
   }
 
- private:
   Node* read(const Node& name, const std::filesystem::path& folder) {
     const auto fail = [&](std::string expected, std::string found, std::string hint) -> Node* {
       faults_.add(name.mark, "include", std::move(expected), std::move(found), std::move(hint));
@@ -98,7 +118,7 @@ class Includes {
     if (root == nullptr) return nullptr;
     if (root->kind != Node::Kind::Mapping) return fail("expected a file with a mapping", root->described(), "");
     open_.push_back(real);
-    Node* whole = merge(root, path.parent_path());
+    Node* whole = merge_all(root, path.parent_path());
     open_.pop_back();
     return whole;
   }
@@ -137,7 +157,7 @@ Node* merged(Node& base, Node& over, Tree& tree) {
 }
 
 Node* with_includes(Node* root, const FileAccess& files, SourceTexts& texts, Tree& tree, FaultList& faults) {
-  Node* out = Includes(files, texts, tree, faults).merge(root, files.folder);
+  Node* out = Includes(files, texts, tree, faults).merge_all(root, files.folder);
   if (out->count > kMostNodes) {
     std::string expected = "expected at most ";
     expected.append(std::to_string(kMostNodes)).append(" nodes in all files");

@@ -16,7 +16,7 @@ namespace supple::scenes {
 inline constexpr std::size_t kMostIncludes = 64;  ///< files of one scene
 
 /// The tree with the files that `include` names merged into it, which may include others: what a file says itself wins over what it
-/// includes; lists of mappings are joined, included items first. Paths are relative to the file that names them.
+/// includes; lists of mappings are joined, included items first. So are items of lists that include files. Paths are relative to the file that names them.
 /// Nodes keep the places in their own files. @param root  a mapping
 [[nodiscard]] Node* with_includes(Node* root, const FileAccess& files, SourceTexts& texts, Tree& tree, FaultList& faults);
 

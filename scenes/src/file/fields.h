@@ -98,11 +98,13 @@ void check_particles(Archive& archive, const ObjectDesc& d) {
 template <class Archive>
 void check_material(Archive& archive, const ObjectDesc& d) {
   using enum ArrangeKind;
-  constexpr std::array kKnown{Single, Line, Ring, Spiral, Grid, Curve, Ball, Fill};
+  constexpr std::array kKnown{Single, Line, Ring, Spiral, Grid, Curve, Ball, Fill, Points};
   const bool known = std::find(kKnown.begin(), kKnown.end(), d.particles.arrange) != kKnown.end();
   archive.check(!d.skeleton.empty(), "material", "expected a skeleton, whose volume has the material", "none", "add 'skeleton'");
-  archive.check(known || d.separate, "material", "expected particles in a line, ring, spiral, curve, grid, ball or filled mesh, or bodies of their own",
+  archive.check(known || d.separate, "material", "expected particles in a line, ring, spiral, curve, grid, ball, filled mesh or at points, or bodies of their own",
                 "arrange: " + std::string(name_of(d.particles.arrange)), "give 'mass' and 'interactions' instead");
+  archive.check(d.particles.arrange != Points || d.separate || d.particles.points.size() < 2 || !d.particles.bonds.empty(), "material", "expected bonds between the particles", "none",
+                "add 'particles.bonds', or give 'mass' and 'interactions' instead");
   archive.check(!d.particles.mass, "particles.mass", "expected either a mass or a material", "both", "leave out one of the two");
 }
 
@@ -115,7 +117,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("hinges_join", d.hinges_join, {}, "whether the interactions also act between two hinges");
   archive("interactions", d.interactions, {}, "laws that act between the particles");
   archive("material", d.material, {},
-          "physical properties, from which masses, moments, bonds, damping and contact follow; or the name of one of 'materials'. Grids become blocks and sheets, balls and filled meshes solids, lines, rings, spirals and curves round rods of the volume that the surface encloses; absent: these have keys of their own");
+          "physical properties, from which masses, moments, bonds, damping and contact follow; or the name of one of 'materials'. Grids become blocks and sheets, balls, filled meshes and points with bonds solids, lines, rings, spirals and curves round rods of the volume that the surface encloses; absent: these have keys of their own");
   archive("skeleton", d.skeleton, {}, "primitives that the particles carry; the surface is where their field equals iso; absent: no surface");
   archive("iso", d.iso, inside(0.0, 1.0, kNumber), "value of the field on the surface");
   archive("blend", d.blend, {}, "how the fields of its particles combine; absent: they sum");
@@ -129,6 +131,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("pins", d.pins, {}, "particles whose position or orientation is held");
   archive("loads", d.loads, {}, "external forces and torques");
   archive("cuts", d.cuts, {}, "bonds that break at given times, as with 'breaking'");
+  archive("scale", d.scale, above(0.0, kNumber), "factor of its lengths: of particles but not their 'at', of the skeleton, of 'within' and of meshes. Forces and stiffnesses stay, those of a material follow");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
   archive("look", d.look, {}, "appearance in pictures");
@@ -152,6 +155,8 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive.check(!d.blend || d.blend->fade == 0.0 || d.breaking || !archive.sound("breaking"), "blend.fade", "expected 'breaking' for bonds that fade", "none", "");
   archive.check(!d.breaking || !d.interactions.empty() || d.material, "breaking", "expected interactions that can break", "none",
                 "add 'interactions' or remove 'breaking'");
+  const bool from_file = d.particles.arrange == ArrangeKind::File || d.particles.arrange == ArrangeKind::Fill;
+  archive.check(d.scale == 1.0 || !from_file, "scale", "expected particles that the scene places", "a file that does", "scale the file instead");
   if (d.material) check_material(archive, d);
   archive.check(!(d.breaking && literal_laws(d)), "breaking", "expected no law with paper_literal, which has no energy", "one", "");
   archive.check(!d.contact || !d.skeleton.empty(), "contact", "expected a skeleton for contact", "none",

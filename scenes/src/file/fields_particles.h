@@ -16,6 +16,18 @@ namespace supple::scenes {
 
 inline constexpr double kMostCount = 1e6;
 
+/// Checks that bonds join two particles each.
+template <class Archive>
+void check_bonds(Archive& archive, const ParticlesDesc& d) {
+  if (!archive.sound("points") || !archive.sound("bonds")) return;
+  archive.check(d.bonds.size() % 2 == 0, "bonds", "expected an even number of particles, two for each bond", std::to_string(d.bonds.size()), "");
+  for (std::size_t k = 0; k < d.bonds.size(); ++k) {
+    const std::string key = "bonds[" + std::to_string(k) + ']';
+    archive.check(d.bonds[k] < static_cast<int>(d.points.size()), key, "expected a whole number from 0 to " + std::to_string(d.points.size() - 1), std::to_string(d.bonds[k]), "");
+    archive.check(k % 2 == 0 || d.bonds[k] != d.bonds[k - 1], key, "expected a bond between two particles", "one twice", "");
+  }
+}
+
 template <class Archive>
 void fields(Archive& archive, ParticlesDesc& d) {
   using enum ArrangeKind;
@@ -36,6 +48,8 @@ void fields(Archive& archive, ParticlesDesc& d) {
   archive("layers", d.layers, only(between(1.0, 1e4, kNumber), {Grid}), "number along z");
   archive.required("length", d.length, only(above(0.0, kLength), {Tube}), "length of the tube along z, about its middle; its particles lie on rings");
   archive.required("points", d.points, only(any(kLength).items(2, 10000), {Curve}), "points through which a smooth curve passes (Catmull-Rom); particles lie on it at equal distances, their x along it");
+  archive.required("points", d.points, only(any(kLength).items(1, 10000), {Points}), "places of the particles");
+  archive("bonds", d.bonds, only(between(0.0, kMostCount, kNumber), {Points}), "numbers of particles, from 0, that a material joins: the first to the second, the third to the fourth and so on");
   archive.required("size", d.size, only(above(0.0, kLength), {Scatter}), "edges of the box, about its middle, in which particles lie at random");
   archive("seed", d.seed, only(between(0.0, 1e9, kNumber), {Scatter}), "another seed gives other places");
   archive.required("file", d.file, only(file_name(), {File, Fill}),
@@ -75,6 +89,7 @@ void fields(Archive& archive, ParticlesDesc& d) {
     archive.check(filled <= kMostFilled, "count", "expected balls of diameter 'spacing' to fill at most 0.3 of the box", short_text(filled) + " of it",
                   "reduce 'count' or 'spacing', or enlarge 'size'");
   }
+  if (d.arrange == Points) check_bonds(archive, d);
   if (d.arrange == Curve) archive.check(d.count >= 2, "count", "expected a whole number >= 2 for a curve", std::to_string(d.count), "");
   if (d.arrange == Grid) {
     const double all = double(d.columns) * d.rows * d.layers;
@@ -153,6 +168,7 @@ void fields(Archive& archive, LoadDesc& d) {
     case ArrangeKind::Curve:
     case ArrangeKind::Scatter:
     case ArrangeKind::Spiral: return d.count;
+    case ArrangeKind::Points: return static_cast<int>(d.points.size());
     case ArrangeKind::Grid:
       if (double(d.columns) * d.rows * d.layers > kMostCount) break;
       return d.columns * d.rows * d.layers;

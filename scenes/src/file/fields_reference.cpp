@@ -27,7 +27,7 @@ objects:
 
 | key | expected | meaning |
 |---|---|---|
-| `include` | the name of a file, or a list of them | files whose keys are merged into this one |
+| `include` | the name of a file, or a list of them | files whose keys are merged into this one; in an item of a list: into that item |
 | `variables` | a mapping of names to values | values for expressions |
 | `defaults` | a mapping of lists of the scene to mappings | keys of every item of a list |
 | `materials` | a mapping of names to mappings | materials that objects may name, `material: jelly`, in place of a mapping |
@@ -41,7 +41,8 @@ objects:
 - **Defaults** are merged into each item of a list of the scene (`objects`, `obstacles`, ...) where it does not have the key.
 - **Files** that a scene names are, after links are resolved, in its own folder or below it. Others need `--allow-path`.
 - **Includes** are such files. Mappings are merged, lists of mappings joined; the scene's own keys win, and so does a later file
-  over an earlier one. Files that an included file names are relative to the scene.
+  over an earlier one. An object in a file of its own is included by an item of `objects`, as often as wanted:
+  `{name: hare, include: bunny.yaml, particles: {at: [0, 0, 1]}, scale: 2, material: rubber}`. Files that an included file names are relative to the scene.
   `include: supple:materials` is part of the program: it has the materials `jelly`, `rubber`, `foam`, `clay` and `steel`.
 
 )";
@@ -138,6 +139,8 @@ Json value_schema(const FieldInfo& info) {
       Json item = mapping_schema(info.children);
       item["properties"]["repeat"] = {{"anyOf", Json::array({number_schema({.low = 0.0}, true), {{"type", "object"}}})},
                                       {"description", "copies of the item: a count, with the index i, or a mapping of indices to counts"}};
+      item["properties"]["include"] = {{"anyOf", Json::array({Json{{"type", "string"}}, list_schema({{"type", "string"}}, {}, 0, kAny)})},
+                                       {"description", "files whose keys are merged into the item"}};
       return list_schema(std::move(item), info.rule, 0, kAny);
     }
   }

@@ -29,8 +29,8 @@ template <> struct EnumNames<RotationName> {
   static constexpr std::array<std::string_view, 2> names{"splitting", "exponential"};
 };
 template <> struct EnumNames<ArrangeKind> {
-  static constexpr std::array<std::string_view, 12> names{"single", "line", "ring", "grid", "spiral", "file", "geodesic",
-                                                          "ball",   "tube", "curve", "scatter", "fill"};
+  static constexpr std::array<std::string_view, 13> names{"single", "line", "ring", "grid", "spiral", "file", "geodesic",
+                                                          "ball",   "tube", "curve", "scatter", "fill", "points"};
 };
 template <> struct EnumNames<NormalKind> {
   static constexpr std::array<std::string_view, 2> names{"axis", "radial"};

@@ -10,6 +10,7 @@
 
 #include "file/expand_scene.h"
 #include "file/read_scene_archive.h"
+#include "file/scale_object.h"
 #include "file/scene_keys.h"
 #include "file/scene_places.h"
 #include "supple/scenes/accuracy.h"
@@ -215,6 +216,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::f
   }
   faults.raise();
   touch_by_material(*root, scene);
+  for (ObjectDesc& object : scene.objects) scale_lengths(object);
   // Ids follow names, so the order of the file changes no bit.
   const auto by_name = [](const auto& a, const auto& b) { return a.name < b.name; };
   std::sort(scene.objects.begin(), scene.objects.end(), by_name);

@@ -98,6 +98,10 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std:
     case ArrangeKind::Curve: out = along_curve(d, key, faults); break;
     case ArrangeKind::Scatter: out = scattered(d, key, faults); break;
     case ArrangeKind::Fill: out = fill_mesh(scene, d, key, faults); break;
+    case ArrangeKind::Points:
+      out.position = d.points;
+      out.orientation.assign(d.points.size(), Quat::Identity());
+      break;
     case ArrangeKind::File:
       out = faults.read(key + ".file", [&] { return io::read_particles(named_file(files_of(scene), d.file), kMost); }).value_or(core::Arrangement());
       break;

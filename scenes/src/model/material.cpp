@@ -29,14 +29,16 @@ double root_of_rising(double most, const Function& f) {
   return 0.5 * (low + high);
 }
 
-double volume_of(const implicit::Skeleton& skeleton, std::span<const Pose> poses) {
+/// @param least_cell  of cells, over the diagonal; 0: as the thinnest primitive needs
+double volume_of(const implicit::Skeleton& skeleton, std::span<const Pose> poses, double least_cell = 0.0) {
   implicit::PlacedSkeleton placed;
   implicit::Field field;
   implicit::place_skeleton(skeleton, poses, placed);
   implicit::index_field(skeleton, placed, field);
   double thinnest = std::numeric_limits<double>::infinity();
   for (const implicit::Primitive& primitive : skeleton.primitive) thinnest = std::min(thinnest, iso_radius(primitive, skeleton.iso));
-  return implicit::enclosed_volume(field, kVolumeCell * thinnest);
+  const double coarsest = least_cell > 0.0 ? least_cell * field.surface_box().extent().norm() : 0.0;
+  return implicit::enclosed_volume(field, std::max(kVolumeCell * thinnest, coarsest));
 }
 
 /// Particles with the same entries of the skeleton carry equal solids, measured once.
@@ -311,6 +313,28 @@ Slenderness add_solid(const ObjectDesc& d, const ObjectModel& object, const Mode
   return {whole.maxCoeff(), whole.minCoeff() / std::sqrt(12.0)};
 }
 
+/// A body of particles that each fill an equal share, with bonds between neighbouring shares of one section A each. E is that of isotropic bonds that deform
+/// alike, E V = (2 + 3 alpha)(1 + nu) sum k l^2 / 15 with k = E A / l; a chain of such bonds is a round rod of this section.
+Slenderness add_packing(const ObjectDesc& d, const ObjectModel& object, const Model& model, MaterialBonds& out) {
+  const std::vector<int>& bonds = d.particles.bonds;
+  const double nu = d.material->poissons_ratio, alpha = (1.0 - 4.0 * nu) / (1.0 + nu);
+  const auto place = [&](std::uint32_t i) -> const Vec3& { return model.rest.position[object.first + i]; };
+  const auto pair = [&](std::size_t b) { return std::pair(static_cast<std::uint32_t>(bonds[2 * b]), static_cast<std::uint32_t>(bonds[2 * b + 1])); };
+  double lengths = 0.0;
+  for (std::size_t b = 0; b < bonds.size() / 2; ++b) lengths += (place(pair(b).second) - place(pair(b).first)).norm();
+  const double section = 15.0 * object.solid_volume / ((2.0 + 3.0 * alpha) * (1.0 + nu) * lengths);
+  for (std::size_t b = 0; b < bonds.size() / 2; ++b) {
+    const auto [i, j] = pair(b);
+    BondStiffness k = rod_bond(d.material->youngs_modulus, std::sqrt(section / std::numbers::pi), (place(j) - place(i)).norm());
+    k.across = std::max(k.across, alpha * k.along);
+    out.add(i, j, k);
+  }
+  Box box;
+  for (std::uint32_t i = object.first; i < object.last; ++i) box.include(model.rest.position[i]);
+  const Vec3 whole = box.extent() + Vec3::Constant(std::sqrt(section));
+  return {whole.maxCoeff(), whole.minCoeff() / std::sqrt(12.0)};
+}
+
 Slenderness add_rod(const ObjectDesc& d, const ObjectModel& object, const Model& model, double volume, MaterialBonds& out) {
   const auto n = object.last - object.first;
   const bool closed = d.particles.arrange == ArrangeKind::Ring && n > 2;
@@ -326,6 +350,13 @@ Slenderness add_rod(const ObjectDesc& d, const ObjectModel& object, const Model&
   return {length + (closed ? 0.0 : 2.0 * radius), 0.5 * radius};
 }
 
+/// Gives the bonds to the model, with the damping of the slowest vibration.
+void finish(const ObjectDesc& d, const Slenderness& body, const ObjectModel& object, MaterialBonds& bonds, Model& model) {
+  bonds.give(model.interactions);
+  const double time = damping_time(*d.material, body);
+  if (!d.rayleigh && time > 0.0) model.interactions.stiffness_damping.push_back({model.particles.object[object.first], time});
+}
+
 }  // namespace
 
 std::vector<double> material_volumes(const ObjectDesc& d, const std::string& key, const core::Arrangement& arrangement,
@@ -338,7 +369,9 @@ std::vector<double> material_volumes(const ObjectDesc& d, const std::string& key
   } else {
     std::vector<Pose> poses(n);
     for (std::size_t i = 0; i < n; ++i) poses[i] = {arrangement.position[i], arrangement.orientation[i]};
-    volume.assign(n, volume_of(skeleton, poses) / static_cast<double>(n));
+    // Small primitives of many shape the surface, and hardly change the volume.
+    constexpr double kCellOfMany = 1.0 / 200.0;
+    volume.assign(n, volume_of(skeleton, poses, d.particles.arrange == ArrangeKind::Points ? kCellOfMany : 0.0) / static_cast<double>(n));
   }
   if (!(*std::min_element(volume.begin(), volume.end()) > 0.0)) {
     faults.add_once(key + ".material", "expected a surface around every particle", "none that encloses a volume", "");
@@ -375,6 +408,11 @@ void add_material_laws(const ObjectDesc& d, const ObjectModel& object, const std
   const double volume = object.solid_volume;
   const FilledLattice filled{*d.material, lattice, d.particles.spacing, volume};
   Slenderness body;
+  if (d.particles.arrange == ArrangeKind::Points) {
+    body = add_packing(d, object, model, bonds);
+    finish(d, body, object, bonds, model);
+    return;
+  }
   const bool solid = d.particles.arrange == ArrangeKind::Ball || d.particles.arrange == ArrangeKind::Fill;
   switch (solid ? 0 : lattice.directions()) {
     case 0: body = add_solid(d, object, model, key, bonds, faults); break;
@@ -382,9 +420,7 @@ void add_material_laws(const ObjectDesc& d, const ObjectModel& object, const std
     case 2: body = add_sheet(filled, key, bonds, faults); break;
     default: body = add_rod(d, object, model, volume, bonds); break;
   }
-  bonds.give(model.interactions);
-  const double time = damping_time(*d.material, body);
-  if (!d.rayleigh && time > 0.0) model.interactions.stiffness_damping.push_back({model.particles.object[object.first], time});
+  finish(d, body, object, bonds, model);
 }
 
 }  // namespace supple::scenes

@@ -191,6 +191,49 @@ objects:
   EXPECT_EQ(scene.objects[1].particles.at.x(), 3.0);
 }
 
+TEST_F(ExpandedScene, MergesFilesIntoItemsAsOftenAsTheyAreIncluded) {
+  write("jelly.yaml", "material: {youngs_modulus: 1e4, density: 1000}\nparticles: {arrange: points, points: [[0, 0, 0], [0, 0, 1]], bonds: [0, 1], at: [9, 9, 9]}\n"
+                      "skeleton: [{shape: point, at: [0, 0, 0.1], kernel: {radius: 2}}]\ncontact: {friction: 0.25}\n");
+  const Scene scene = parse(R"(
+schema: 1
+duration: 1
+include: supple:materials
+objects:
+  - {name: a, include: jelly.yaml, particles: {at: [0, 0, 2]}}
+  - {repeat: 2, name: "b${i}", include: jelly.yaml, particles: {at: ["${1.5*i}", 0, 0]}, scale: 3, material: rubber}
+)");
+  ASSERT_EQ(scene.objects.size(), 3U);
+  EXPECT_EQ(scene.objects[0].particles.at, Vec3(0, 0, 2));
+  EXPECT_EQ(scene.objects[0].particles.points[1], Vec3(0, 0, 1));
+  EXPECT_EQ(scene.objects[0].material->density, 1000.0);
+  EXPECT_EQ(scene.objects[2].particles.at, Vec3(1.5, 0, 0));
+  EXPECT_EQ(scene.objects[2].particles.points[1], Vec3(0, 0, 3));
+  EXPECT_DOUBLE_EQ(scene.objects[2].skeleton[0].at.z(), 0.3);
+  EXPECT_EQ(scene.objects[2].skeleton[0].kernel.radius, 6.0);
+  EXPECT_EQ(scene.objects[2].material->youngs_modulus, 2e6);
+  EXPECT_EQ(scene.objects[2].contact->friction, 0.25);
+}
+
+TEST_F(ExpandedScene, ScaleMultipliesLengthsOnly) {
+  const std::string head = "schema: 1\nduration: 1\nobjects:\n  - name: a\n    particles: {arrange: grid, columns: 2, rows: 2, spacing: 0.5, at: [1, 1, 1], mass: 2}\n";
+  const Scene scene = parse(head + "    interactions: [{law: bond_frame, within: 0.6, stretch: 7, rotation: 1}]\n"
+                                   "    skeleton: [{shape: segment, half_length: 0.25, end_radius: 0.4, stretch: [1, 2, 1], kernel: {type: gascuel, radius: 0.5, thickness: 0.2, slope: 2}}]\n"
+                                   "    meshing: {cell: 0.05}\n    scale: 10\n");
+  const ObjectDesc& d = scene.objects[0];
+  EXPECT_EQ(d.particles.spacing, 5.0);
+  EXPECT_EQ(d.particles.at, Vec3(1, 1, 1));
+  EXPECT_EQ(d.particles.mass, 2.0);
+  EXPECT_EQ(d.interactions[0].within, 6.0);
+  EXPECT_EQ(d.interactions[0].stretch, 7.0);
+  EXPECT_EQ(d.skeleton[0].half_length, 2.5);
+  EXPECT_EQ(d.skeleton[0].end_radius, 4.0);
+  EXPECT_EQ(d.skeleton[0].stretch, Vec3(1, 2, 1));
+  EXPECT_EQ(d.skeleton[0].kernel.radius, 5.0);
+  EXPECT_EQ(d.skeleton[0].kernel.thickness, 2.0);
+  EXPECT_DOUBLE_EQ(*d.skeleton[0].kernel.slope, 0.2);
+  EXPECT_EQ(d.meshing.cell, 0.5);
+}
+
 TEST_F(ExpandedScene, NamesThePlaceInTheIncludedFile) {
   write("part.yaml", "objects:\n  - name: a\n    particles: {arrange: single, mass: -1}\n");
   const Fault fault = faults("include: part.yaml\nschema: 1\nduration: 1\n")[0];

@@ -117,7 +117,7 @@ void add_arrangements(std::vector<Option>& all) {
            {"spiral", "count: 6, inner_radius: 0.1, outer_radius: 0.3"}, {"file", "file: points.csv"},
            {"geodesic", "frequency: 1, radius: 0.3"}, {"ball", "radius: 0.2, spacing: 0.1"}, {"tube", "radius: 0.2, length: 0.4, spacing: 0.1"},
            {"curve", "count: 4, points: [[0, 0, 0], [1, 0, 0], [1, 1, 0]]"}, {"scatter", "count: 3, size: [1, 1, 1], spacing: 0.1"},
-           {"fill", "file: block.obj, spacing: 0.2"}}) {
+           {"fill", "file: block.obj, spacing: 0.2"}, {"points", "points: [[0, 0, 0], [1, 0, 0]]"}}) {
     arranged("arrange=" + name, "$", single, "arrange: " + name + ", " + rest);
   }
   arranged("count", "arrange: line, count: $, spacing: 0.2", "3", "4");
@@ -152,6 +152,10 @@ void add_arrangements(std::vector<Option>& all) {
   };
   loaded("mass", "1", "2");
   loaded("inertia_radius", "auto", "0.2");
+  all.push_back(differs("objects.particles.bonds", In::State,
+                        {.particles = "arrange: points, points: [[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0]], bonds: [$]", .interactions = "",
+                         .object = "material: {youngs_modulus: 1e4, density: 1000}\n    loads: [{particle: 0, force: [1, 0.5, 2]}]"}, "0, 1, 1, 2", "0, 1, 0, 2"));
+  all.push_back(differs("objects.scale", In::State, {.interactions = "", .object = "scale: $"}, "1", "2"));
   loaded("inertia_axes", "[0.2, 0.2, 0.2]", "[0.1, 0.2, 0.3]");
 }
 

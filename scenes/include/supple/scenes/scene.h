@@ -33,7 +33,7 @@ struct IntegratorDesc {
   std::optional<double> tolerance;   ///< absent: 1e-6 (adaptive) or 1e-9 (implicit methods)
 };
 
-enum class ArrangeKind : std::uint8_t { Single, Line, Ring, Grid, Spiral, File, Geodesic, Ball, Tube, Curve, Scatter, Fill };
+enum class ArrangeKind : std::uint8_t { Single, Line, Ring, Grid, Spiral, File, Geodesic, Ball, Tube, Curve, Scatter, Fill, Points };
 enum class NormalKind : std::uint8_t { Axis, Radial };
 
 /// objects[].particles
@@ -45,13 +45,14 @@ struct ParticlesDesc {
   double inner_radius = 0.0;          ///< spiral [m]
   double outer_radius = 0.0;          ///< spiral [m]
   double turns = 1.0;                 ///< spiral
-  double spacing = 0.0;               ///< line, grid, ball, tube, fill; scatter: the least distance [m]
+  double spacing = 0.0;               ///< line, grid, ball, tube, fill; scatter: the least distance; points: the typical one [m]
   double disorder = 0.0;              ///< each particle is moved at random by at most this [m]
   int columns = 1;                    ///< grid
   int rows = 1;                       ///< grid
   int layers = 1;                     ///< grid, along z
   double length = 0.0;                ///< tube, along z [m]
-  std::vector<Vec3> points;           ///< curve: points on its way [m]
+  std::vector<Vec3> points;           ///< curve: points on its way; points: the particles [m]
+  std::vector<int> bonds;             ///< points: pairs of particles that a material joins, one after the other
   Vec3 size = Vec3::Zero();           ///< scatter: edges of a box [m]
   int seed = 1;                       ///< scatter
   std::string file;                   ///< file: CSV or PLY of particles; fill: OBJ or PLY of a closed mesh; beside the scene
@@ -303,6 +304,7 @@ struct ObjectDesc {
   std::vector<PinDesc> pins;
   std::vector<LoadDesc> loads;
   std::vector<CutDesc> cuts;
+  double scale = 1.0;                       ///< of its lengths, which reading has multiplied by it
   Vec3 colour = Vec3(0.8, 0.8, 0.8);        ///< sRGB
   double roughness = 0.45;
   LookDesc look;

@@ -1,0 +1,352 @@
+#include "supple/fit/fit.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <numeric>
+
+#include "fit/balls.h"
+#include "fit/measure.h"
+#include "fit/packing.h"
+#include "fit/solve.h"
+#include "supple/core/error.h"
+#include "supple/core/interrupt.h"
+#include "supple/core/math.h"
+
+namespace supple::fit {
+namespace {
+
+constexpr double kPointRadius = 0.45420201867;  // of a lone point's surface at iso 0.5, over that of its support
+
+void expect_range(const char* option, bool good, const char* expected, const std::string& found) {
+  if (good) return;
+  throw Error(ErrorKind::Usage, Fault{.place = option, .key = {}, .expected = expected, .found = found, .hint = {}});
+}
+
+void check(const FitOptions& options) {
+  expect_range("--error", options.error >= 1e-3 && options.error <= 0.1, "expected a share of the diagonal from 0.1% to 10%", std::to_string(options.error));
+  expect_range("--particles", options.particles >= 1 && options.particles <= 10000, "expected a whole number from 1 to 10000", std::to_string(options.particles));
+  expect_range("--primitives", options.primitives >= 1 && options.primitives <= 10000, "expected a whole number from 1 to 10000", std::to_string(options.primitives));
+}
+
+/// The data in axes of its own: the middle of its box is the origin, the diagonal is 1.
+struct Frame {
+  Vec3 middle;
+  double diagonal;
+};
+
+Frame normalise(Mesh& mesh) {
+  Box box;
+  for (const Vec3& p : mesh.position) box.include(p);
+  const Frame frame{box.centre(), box.extent().norm()};
+  for (Vec3& p : mesh.position) p = (p - frame.middle) / frame.diagonal;
+  return frame;
+}
+
+constexpr std::size_t kSamples = 16000;
+
+/// Handles of closed pieces.
+long genus_of(const MeshReport& mesh) { return static_cast<long>(mesh.components) - mesh.euler_characteristic / 2; }
+
+/// Samples, distances and the balls that touch the surface; all lengths over the diagonal.
+struct Data {
+  Data(const Mesh& given, double most, double error, const Executor& executor)
+      : mesh(given), tree(given), surface(sample_surface(given, kSamples)), grid(surface.position, surface.spacing), largest_ball(most), genus(genus_of(inspect(given))) {
+    constexpr double kStep = 1.0 / 48.0;
+    around = sample_surroundings(mesh, tree, kStep, executor);
+    constexpr double kSlack = 0.2, kBeforeHollow = 2.0;  // balls larger than a hollow blend across it
+    radius = touching_radii(surface, grid, -1.0, most, kSlack * error, executor);
+    const std::vector<double> outside = touching_radii(surface, grid, 1.0, most, kSlack * error, executor);
+    for (std::size_t k = 0; k < radius.size(); ++k) radius[k] = std::min(radius[k], std::max(kBeforeHollow * outside[k], error));
+  }
+
+  const Mesh& mesh;
+  SurfaceTree tree;
+  SurfaceSamples surface;
+  PointGrid grid;
+  Surroundings around;
+  std::vector<double> radius;  ///< of the largest ball at a sample, from inside and with respect to hollows outside
+  double largest_ball;
+  long genus;
+};
+
+Targets targets_of(const Data& data) {
+  Targets out{data.surface, data.radius, {}, {}};
+  for (double& size : out.size) size = std::max(size, 0.25 * data.surface.spacing);
+  constexpr double kWeight = 0.5;  // of the distance from the surface
+  for (std::size_t k = 0; k < data.around.inside.size(); ++k) {
+    if (data.around.depth[k] > data.around.step) out.inside.add(data.around.inside[k], kWeight * data.around.depth[k]);
+  }
+  for (std::size_t k = 0; k < data.around.outside.size(); ++k) {
+    if (data.around.gap[k] > data.around.step) out.outside.add(data.around.outside[k], kWeight * data.around.gap[k]);
+  }
+  return out;
+}
+
+std::vector<Blob> blobs_of(std::span<const Ball> balls) {
+  std::vector<Blob> out;
+  for (const Ball& ball : balls) out.push_back({.centre = ball.centre, .axes = Vec3::Constant(ball.radius / kPointRadius)});
+  return out;
+}
+
+/// Where data and fit are farther apart than `most`.
+struct Faults {
+  std::vector<std::uint32_t> missed;  ///< samples of the data outside the fit
+  std::vector<Vec3> inside, outside;  ///< points of the fitted surface inside and outside the data
+  double largest = 0.0;
+  bool topology = false;              ///< the fitted surface has one piece, and as many handles as the data
+};
+
+/// Vertices of all pieces of a mesh but the largest.
+std::vector<char> on_small_pieces(const Mesh& mesh) {
+  std::vector<std::uint32_t> parent(mesh.position.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto root = [&](std::uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (const auto& t : mesh.triangle) {
+    parent[root(t[1])] = root(t[0]);
+    parent[root(t[2])] = root(t[0]);
+  }
+  std::vector<std::size_t> count(parent.size(), 0);
+  for (std::uint32_t i = 0; i < parent.size(); ++i) ++count[root(i)];
+  const auto largest = static_cast<std::uint32_t>(std::max_element(count.begin(), count.end()) - count.begin());
+  std::vector<char> out(parent.size());
+  for (std::uint32_t i = 0; i < parent.size(); ++i) out[i] = root(i) != largest ? 1 : 0;
+  return out;
+}
+
+Faults find_faults(const Data& data, const implicit::Field& field, double cell, double most, const Executor& executor) {
+  Faults out;
+  const Mesh mesh = mesh_of(field, cell, executor);
+  if (mesh.triangle.empty()) {
+    out.missed.resize(data.surface.position.size());
+    std::iota(out.missed.begin(), out.missed.end(), 0U);
+    out.largest = 1.0;
+    return out;
+  }
+  const SurfaceTree tree(mesh);
+  const std::vector<double> of_data = distances(data.surface.position, tree, executor), of_fit = distances(mesh.position, data.tree, executor);
+  std::vector<double> value(data.surface.position.size());
+  implicit::FieldView(field).evaluate(data.surface.position, value);
+  for (std::uint32_t k = 0; k < of_data.size(); ++k) {
+    out.largest = std::max(out.largest, of_data[k]);
+    if (of_data[k] > most && value[k] < 0.0) out.missed.push_back(k);
+  }
+  const MeshReport report = inspect(mesh);
+  out.topology = report.components == 1 && genus_of(report) == data.genus;
+  const std::vector<char> small = on_small_pieces(mesh);
+  const double apart = 0.5 * most;
+  std::vector<Vec3> kept;
+  for (std::size_t k = 0; k < of_fit.size(); ++k) {
+    out.largest = std::max(out.largest, of_fit[k]);
+    if (of_fit[k] <= most && small[k] == 0) continue;
+    const auto close = [&](const Vec3& p) { return (p - mesh.position[k]).squaredNorm() < apart * apart; };
+    if (std::any_of(kept.begin(), kept.end(), close)) continue;
+    kept.push_back(mesh.position[k]);
+    (data.tree.signed_distance(kept.back()) < 0.0 ? out.inside : out.outside).push_back(kept.back());
+  }
+  return out;
+}
+
+/// Blobs that no sample needs are dropped: those whose share of the field stays small wherever it is compared with the data.
+void prune(std::vector<Blob>& blobs, const Targets& targets) {
+  constexpr double kLeast = 0.01;
+  implicit::Field field;
+  build_field(blobs, field);
+  std::vector<double> largest(blobs.size(), 0.0);
+  implicit::FieldParts parts;
+  for (const auto* points : {&targets.surface.position, &targets.inside.position}) {
+    implicit::FieldView(field).evaluate_parts(*points, parts);
+    for (std::size_t e = 0; e < parts.part.size(); ++e) largest[parts.part[e]] = std::max(largest[parts.part[e]], parts.value[e]);
+  }
+  std::vector<Blob> kept;
+  for (std::size_t k = 0; k < blobs.size(); ++k) {
+    if (largest[k] >= kLeast) kept.push_back(blobs[k]);
+  }
+  blobs = std::move(kept);
+}
+
+/// The blob with the largest share of the field at each point; none where no blob reaches.
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+std::vector<std::uint32_t> owners(const implicit::Field& field, std::span<const Vec3> points) {
+  implicit::FieldParts parts;
+  implicit::FieldView(field).evaluate_parts(points, parts);
+  std::vector<std::uint32_t> out(points.size(), kNone);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    double largest = 0.0;
+    for (std::uint32_t e = parts.offset[k]; e < parts.offset[k + 1]; ++e) {
+      if (parts.value[e] <= largest) continue;
+      largest = parts.value[e];
+      out[k] = parts.part[e];
+    }
+  }
+  return out;
+}
+
+/// Blobs that hold a point outside the data are too large for what they carry: balls of at most a share of their radius take their place, so that they
+/// cover the same samples.
+void divide(std::vector<Blob>& blobs, const Data& data, const implicit::Field& field, std::span<const Vec3> outside, double reach) {
+  constexpr double kShare = 0.6;
+  std::vector<char> large(blobs.size(), 0);
+  for (const std::uint32_t k : owners(field, outside)) {
+    if (k != kNone) large[k] = 1;
+  }
+  const std::vector<std::uint32_t> owner = owners(field, data.surface.position);
+  std::vector<double> radius = data.radius;
+  std::vector<std::uint32_t> wanted;
+  for (std::uint32_t s = 0; s < owner.size(); ++s) {
+    if (owner[s] == kNone || large[owner[s]] == 0) continue;
+    radius[s] = std::min(radius[s], kShare * kPointRadius * blobs[owner[s]].axes.minCoeff());
+    wanted.push_back(s);
+  }
+  std::vector<Blob> out;
+  for (std::size_t k = 0; k < blobs.size(); ++k) {
+    if (large[k] == 0) out.push_back(blobs[k]);
+  }
+  const std::vector<Blob> parts = blobs_of(cover_surface(data.surface, data.grid, radius, wanted, reach));
+  out.insert(out.end(), parts.begin(), parts.end());
+  blobs = std::move(out);
+}
+
+struct Skeleton {
+  std::vector<Blob> blobs;
+  double cell = 0.0;  ///< of meshes that show its errors
+};
+
+Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executor& executor) {
+  constexpr double kReach = 0.6, kFirst = 0.35;  // of the error: balls reach samples, and distances that call for more
+  constexpr double kLeastReach = 0.15, kEnough = 0.7, kFiner = 0.6;
+  constexpr double kWeight = 4.0;  // of a point where the sign is wrong, over its distance from the data
+  constexpr int kRounds = 8, kIterations = 8;
+  Targets targets = targets_of(data);
+  std::vector<std::uint32_t> all(data.surface.position.size());
+  std::iota(all.begin(), all.end(), 0U);
+  std::vector<Ball> balls = cover_surface(data.surface, data.grid, data.radius, all, kReach * options.error);
+  cover_inside(data.around, data.largest_ball, balls);
+  if (balls.size() > options.primitives) balls.resize(options.primitives);
+  Skeleton out{blobs_of(balls), std::min(0.5 * options.error, 1.0 / 128.0)};
+  const SolveOptions solving{.iterations = kIterations, .smallest = 0.25 * options.error / kPointRadius, .largest = 1.5 * data.largest_ball / kPointRadius};
+  double reach = kReach * options.error, most = kFirst * options.error;
+  for (int round = 0; round < kRounds; ++round) {
+    heed_scope();
+    balance(out.blobs, targets, solving, executor);
+    solve(out.blobs, targets, solving, executor);
+    prune(out.blobs, targets);
+    implicit::Field field;
+    build_field(out.blobs, field);
+    const Faults faults = find_faults(data, field, out.cell, most, executor);
+    if ((faults.topology && faults.largest <= kEnough * options.error) || round + 1 == kRounds) break;
+    if (faults.largest <= kEnough * options.error) most *= kFiner;  // what is wrong in the topology is smaller
+    const auto weight = [&](const Vec3& p) { return kWeight * std::max(data.tree.distance(p), most); };
+    for (const Vec3& p : faults.inside) targets.inside.add(p, weight(p));
+    for (const Vec3& p : faults.outside) targets.outside.add(p, weight(p));
+    reach = std::max(0.7 * reach, kLeastReach * options.error);
+    divide(out.blobs, data, field, faults.outside, reach);
+    std::vector<Ball> more = cover_surface(data.surface, data.grid, data.radius, faults.missed, reach);
+    for (const Vec3& p : faults.inside) more.push_back({p, std::min(data.tree.distance(p), data.largest_ball)});
+    more.resize(std::min<std::size_t>(more.size(), options.primitives - std::min<std::size_t>(options.primitives, out.blobs.size())));
+    const std::vector<Blob> added = blobs_of(more);
+    out.blobs.insert(out.blobs.end(), added.begin(), added.end());
+  }
+  return out;
+}
+
+Vec3 centre_of_mass(const Mesh& mesh) {
+  Vec3 sum = Vec3::Zero();
+  double volume = 0.0;
+  for (const auto& t : mesh.triangle) {
+    const Vec3 &a = mesh.position[t[0]], &b = mesh.position[t[1]], &c = mesh.position[t[2]];
+    const double part = a.dot(b.cross(c)) / 6.0;
+    volume += part;
+    sum += 0.25 * part * (a + b + c);
+  }
+  return sum / volume;
+}
+
+void warn_of_units(FitReport& report) {
+  constexpr double kLargest = 100.0, kSmallest = 1e-4;
+  if (report.diagonal <= kLargest && report.diagonal >= kSmallest) return;
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), "the data is %.3g m across: coordinates count as metres; scale the object in the scene where they are others", report.diagonal);
+  report.warnings.emplace_back(text.data());
+}
+
+/// Primitives hang on the particle whose share they lie in.
+void hang(FittedObject& object, const Skeleton& skeleton, const Packing& packing, const Surroundings& around, const Frame& frame) {
+  const PointGrid grid(around.inside, around.step);
+  for (const Blob& blob : skeleton.blobs) {
+    const std::uint32_t particle = packing.share[grid.nearest(blob.centre)];
+    object.primitives.push_back({particle, frame.diagonal * (blob.centre - packing.particle[particle]), frame.diagonal * blob.axes, blob.turn});
+  }
+  std::stable_sort(object.primitives.begin(), object.primitives.end(), [](const auto& a, const auto& b) { return a.particle < b.particle; });
+}
+
+void report_errors(FittedObject& object, const Data& data, const Skeleton& skeleton, const FitOptions& options, const Executor& executor) {
+  FitReport& report = object.report;
+  implicit::Field field;
+  build_field(skeleton.blobs, field);
+  object.surface = mesh_of(field, 0.5 * skeleton.cell, executor);
+  const MeshReport in = inspect(data.mesh), out = inspect(object.surface);
+  report.genus_in = genus_of(in);
+  report.genus_out = genus_of(out);
+  report.pieces_out = out.components;
+  report.volume_error = out.volume / in.volume - 1.0;
+  const double within = 0.01 * options.error;
+  report.from_data = measure(data.mesh, object.surface, SurfaceTree(object.surface), within, executor);
+  report.to_data = measure(object.surface, data.mesh, data.tree, within, executor);
+  report.within = report.two_sided() <= options.error;
+  if (!report.within) {
+    std::array<char, 200> text{};
+    std::snprintf(text.data(), text.size(), "the largest distance is %.3g %% of the diagonal, more than the %.3g %% asked with at most %u primitives", 100.0 * report.two_sided(), 100.0 * options.error,
+                  options.primitives);
+    report.warnings.emplace_back(text.data());
+  }
+  if (report.genus_in != report.genus_out || report.pieces_out != 1) {
+    report.warnings.push_back("the fitted surface has " + std::to_string(report.pieces_out) + " pieces and " + std::to_string(report.genus_out) + " handles, the data has 1 and " +
+                              std::to_string(report.genus_in));
+  }
+}
+
+}  // namespace
+
+FittedObject fit(const std::filesystem::path& file, const FitOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  check(options);
+  const Executor executor(options.threads);
+  FittedObject object;
+  FitReport& report = object.report;
+  Mesh mesh = read_surface(file, options.pieces, report.repair);
+  const Frame frame = normalise(mesh);
+  report.diagonal = frame.diagonal;
+  const double volume = inspect(mesh).volume;
+  report.volume = volume * frame.diagonal * frame.diagonal * frame.diagonal;
+  warn_of_units(report);
+  const double spacing = math::pow(volume / options.particles, 1.0 / 3.0);
+  constexpr double kLargestBall = 1.25;  // of the spacing: a primitive moves with one particle
+  const Data data(mesh, std::min(0.5, kLargestBall * spacing), options.error, executor);
+  const Skeleton skeleton = fit_skeleton(data, options, executor);
+  constexpr double kPointsOfShare = 40.0, kLeastPoints = 20000.0;
+  const double points = std::max(kPointsOfShare * options.particles, kLeastPoints);
+  const Surroundings lattice = sample_surroundings(mesh, data.tree, math::pow(volume / points, 1.0 / 3.0), executor);
+  const Packing packing = pack_inside(lattice, options.particles, executor);
+  hang(object, skeleton, packing, lattice, frame);
+  const Vec3 middle = centre_of_mass(mesh);
+  object.origin = frame.middle + frame.diagonal * middle;
+  object.spacing = frame.diagonal * spacing;
+  for (const Vec3& p : packing.particle) object.particles.push_back(frame.diagonal * (p - middle));
+  object.bonds = packing.bond;
+  report_errors(object, data, skeleton, options, executor);
+  for (Vec3& p : object.surface.position) p = frame.diagonal * (p - middle);
+  report.primitives = object.primitives.size();
+  report.particles = object.particles.size();
+  report.bonds = object.bonds.size();
+  report.rigid = packing.connected;
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return object;
+}
+
+}  // namespace supple::fit

@@ -1,0 +1,24 @@
+/// @file packing.h
+/// Particles inside a closed mesh, each in the middle of an equal share of the volume, and bonds between neighbouring shares.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "fit/samples.h"
+
+namespace supple::fit {
+
+struct Packing {
+  std::vector<Vec3> particle;
+  std::vector<std::uint32_t> share;                   ///< of each point of the lattice inside: the particle that it belongs to
+  std::vector<std::array<std::uint32_t, 2>> bond;     ///< sorted
+  bool connected = false;
+};
+
+/// Centroidal Voronoi tessellation of the points of the lattice (Lloyd 1982), from points that lie farthest from one another. Bonds join particles whose shares
+/// have a common face within the solid, so not across a gap; parts that a neck thinner than the lattice joins get a bond between their nearest particles.
+/// @param count  fewer where the lattice has fewer points
+[[nodiscard]] Packing pack_inside(const Surroundings& around, std::size_t count, const Executor& executor);
+
+}  // namespace supple::fit

@@ -1,0 +1,159 @@
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/IO/polygon_soup_io.h>
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
+#include <CGAL/Polygon_mesh_processing/measure.h>
+#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
+#include <CGAL/Surface_mesh.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "fit/surface.h"
+#include "supple/core/error.h"
+
+namespace supple::fit {
+namespace {
+
+namespace pmp = CGAL::Polygon_mesh_processing;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using SurfaceMesh = CGAL::Surface_mesh<Point>;
+
+constexpr double kMostClosed = 0.1;  // area of triangles that close holes, over the area of all
+
+[[noreturn]] void refuse(const std::filesystem::path& file, std::string expected, std::string found, std::string hint, ErrorKind kind = ErrorKind::Scene) {
+  throw Error(kind, Fault{.place = file.string(), .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = std::move(hint)});
+}
+
+std::string text_of(const Point& p) {
+  std::array<char, 96> text{};
+  std::snprintf(text.data(), text.size(), "(%.6g, %.6g, %.6g)", p.x(), p.y(), p.z());
+  return text.data();
+}
+
+struct Soup {
+  std::vector<Point> points;
+  std::vector<std::vector<std::size_t>> faces;
+};
+
+Soup read_soup(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array kKnown{".ply", ".obj", ".off", ".stl"};
+  if (std::find(kKnown.begin(), kKnown.end(), extension) == kKnown.end()) {
+    refuse(file, "expected a mesh in a file .ply, .obj, .off or .stl", extension.empty() ? "no extension" : '\'' + extension + '\'', "", ErrorKind::Usage);
+  }
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(file, unknown)) refuse(file, "expected a file that can be read", "none", "", ErrorKind::Io);
+  Soup soup;
+  if (!CGAL::IO::read_polygon_soup(file.string(), soup.points, soup.faces, CGAL::parameters::verbose(false))) {
+    refuse(file, "expected a mesh", "text or bytes that are none, or that end early", "the extension says how a file is read");
+  }
+  if (soup.faces.empty()) refuse(file, "expected triangles", "none", "");
+  for (const std::vector<std::size_t>& face : soup.faces) {
+    for (const std::size_t corner : face) {
+      if (corner >= soup.points.size()) refuse(file, "expected corners among the " + std::to_string(soup.points.size()) + " vertices", std::to_string(corner), "");
+    }
+  }
+  for (const Point& p : soup.points) {
+    if (!std::isfinite(p.x()) || !std::isfinite(p.y()) || !std::isfinite(p.z())) refuse(file, "expected finite coordinates", text_of(p), "");
+  }
+  return soup;
+}
+
+void expect_two_faces_at_edges(const std::filesystem::path& file, const Soup& soup) {
+  std::map<std::pair<std::size_t, std::size_t>, int> faces;
+  for (const std::vector<std::size_t>& face : soup.faces) {
+    for (std::size_t k = 0; k < face.size(); ++k) {
+      const std::size_t a = face[k], b = face[(k + 1) % face.size()];
+      ++faces[std::minmax(a, b)];
+    }
+  }
+  const auto many = [](const auto& edge) { return edge.second > 2; };
+  const auto first = std::find_if(faces.begin(), faces.end(), many);
+  if (first == faces.end()) return;
+  refuse(file, "expected at most two triangles at every edge",
+         std::to_string(std::count_if(faces.begin(), faces.end(), many)) + " edges with more, one from " + text_of(soup.points[first->first.first]) + " to " +
+             text_of(soup.points[first->first.second]),
+         "remove walls inside, or join the parts into one solid");
+}
+
+void close_holes(const std::filesystem::path& file, SurfaceMesh& mesh, Repair& repair) {
+  const double area = pmp::area(mesh);
+  std::vector<SurfaceMesh::Halfedge_index> cycles;
+  pmp::extract_boundary_cycles(mesh, std::back_inserter(cycles));
+  double closed = 0.0;
+  for (const SurfaceMesh::Halfedge_index cycle : cycles) {
+    const Point at = mesh.point(mesh.source(cycle));
+    std::vector<SurfaceMesh::Face_index> patch;
+    pmp::triangulate_hole(mesh, cycle, std::back_inserter(patch), CGAL::parameters::use_delaunay_triangulation(true));
+    if (patch.empty()) refuse(file, "expected a closed mesh", "a hole at " + text_of(at) + " that no triangles close", "close it in a mesh editor");
+    closed += pmp::area(patch, mesh);
+    ++repair.holes;
+    if (closed > kMostClosed * (area + closed)) {
+      refuse(file, "expected holes whose closing adds less than a tenth of the area", std::to_string(cycles.size()) + " holes, the largest part at " + text_of(at),
+             "close them in a mesh editor; surfaces without inside are not fitted");
+    }
+  }
+  repair.closed_area = closed / (area + closed);
+}
+
+void keep_pieces(const std::filesystem::path& file, SurfaceMesh& mesh, Pieces pieces, Repair& repair) {
+  const auto [piece, fresh] = mesh.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:piece", 0);
+  repair.pieces = pmp::connected_components(mesh, piece);
+  if (repair.pieces < 2) return;
+  if (pieces == Pieces::Refuse) refuse(file, "expected a mesh in one piece", std::to_string(repair.pieces) + " pieces", "choose the largest by --pieces largest");
+  std::vector<double> volume(repair.pieces, 0.0);
+  for (const SurfaceMesh::Face_index f : mesh.faces()) {
+    const auto h = mesh.halfedge(f);
+    const Point a = mesh.point(mesh.source(h)), b = mesh.point(mesh.target(h)), c = mesh.point(mesh.target(mesh.next(h)));
+    volume[piece[f]] += CGAL::scalar_product(a - CGAL::ORIGIN, CGAL::cross_product(b - CGAL::ORIGIN, c - CGAL::ORIGIN)) / 6.0;
+  }
+  const auto larger = [](double x, double y) { return std::abs(x) < std::abs(y); };
+  const std::vector<std::size_t> kept{static_cast<std::size_t>(std::max_element(volume.begin(), volume.end(), larger) - volume.begin())};
+  pmp::keep_connected_components(mesh, kept, piece);
+  mesh.collect_garbage();
+}
+
+Mesh plain_mesh(const SurfaceMesh& mesh) {
+  Mesh out;
+  for (const SurfaceMesh::Vertex_index v : mesh.vertices()) out.position.emplace_back(mesh.point(v).x(), mesh.point(v).y(), mesh.point(v).z());
+  for (const SurfaceMesh::Face_index f : mesh.faces()) {
+    const auto h = mesh.halfedge(f);
+    out.triangle.push_back({mesh.source(h), mesh.target(h), mesh.target(mesh.next(h))});
+  }
+  return out;
+}
+
+}  // namespace
+
+Mesh read_surface(const std::filesystem::path& file, Pieces pieces, Repair& repair) {
+  Soup soup = read_soup(file);
+  pmp::repair_polygon_soup(soup.points, soup.faces);
+  expect_two_faces_at_edges(file, soup);
+  pmp::orient_polygon_soup(soup.points, soup.faces);
+  if (soup.faces.empty() || !pmp::is_polygon_soup_a_polygon_mesh(soup.faces)) refuse(file, "expected triangles that form a surface", "none", "");
+  SurfaceMesh mesh;
+  pmp::polygon_soup_to_polygon_mesh(soup.points, soup.faces, mesh);
+  pmp::triangulate_faces(mesh);
+  close_holes(file, mesh, repair);
+  keep_pieces(file, mesh, pieces, repair);
+  repair.turned = !pmp::is_outward_oriented(mesh);
+  if (repair.turned) pmp::reverse_face_orientations(mesh);
+  repair.vertices = mesh.number_of_vertices();
+  repair.triangles = mesh.number_of_faces();
+  const double volume = pmp::volume(mesh), area = pmp::area(mesh);
+  if (!(volume > 1e-6 * area * std::sqrt(area))) refuse(file, "expected a mesh that encloses a volume", "a flat one", "surfaces without inside are not fitted");
+  return plain_mesh(mesh);
+}
+
+}  // namespace supple::fit

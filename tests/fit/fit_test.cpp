@@ -1,0 +1,68 @@
+// Objects fitted to shapes that are known.
+#include "supple/fit/fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fit/shapes.h"
+
+namespace supple::fit {
+namespace {
+
+void expect_good(const FittedObject& object, double error, long genus) {
+  const FitReport& r = object.report;
+  EXPECT_TRUE(r.within);
+  EXPECT_LE(r.two_sided(), error);
+  EXPECT_LE(std::max(r.from_data.rms, r.to_data.rms), 0.25 * error);
+  EXPECT_GE(r.from_data.largest, r.from_data.rms);
+  EXPECT_LT(std::abs(r.volume_error), 0.02);
+  EXPECT_EQ(r.genus_in, genus);
+  EXPECT_EQ(r.genus_out, genus);
+  EXPECT_EQ(r.pieces_out, 1U);
+  EXPECT_TRUE(r.rigid);
+  EXPECT_EQ(r.primitives, object.primitives.size());
+  EXPECT_EQ(r.particles, object.particles.size());
+  for (const FittedPrimitive& p : object.primitives) EXPECT_LT(p.particle, object.particles.size());
+  EXPECT_TRUE(r.warnings.empty());
+}
+
+TEST(Fit, EllipsoidWithinTheErrorAsked) {
+  const Mesh mesh = test::moved_sphere(5, [](const Vec3& p) { return Vec3(3.0 * p.x() + 10.0, 2.0 * p.y(), p.z()); });
+  const FittedObject object = fit(test::saved(mesh, "ellipsoid"), {.error = 0.02, .particles = 40});
+  expect_good(object, 0.02, 0);
+  EXPECT_LT((object.origin - Vec3(10.0, 0.0, 0.0)).norm(), 1e-3);
+}
+
+TEST(Fit, TorusKeepsItsHandle) { expect_good(fit(test::saved(test::torus(1.0, 0.35, 96, 48), "torus"), {.error = 0.02, .particles = 60}), 0.02, 1); }
+
+TEST(Fit, DumbbellOfTwoBalls) {
+  // A ball drawn out to a neck in the middle.
+  const Mesh mesh = test::moved_sphere(5, [](const Vec3& p) {
+    const double waist = 0.35 + 0.65 * p.x() * p.x();
+    return Vec3(2.0 * p.x(), waist * p.y(), waist * p.z());
+  });
+  expect_good(fit(test::saved(mesh, "dumbbell"), {.error = 0.02, .particles = 50}), 0.02, 0);
+}
+
+TEST(Fit, DoesNotDependOnThreads) {
+  const auto file = test::saved(test::torus(1.0, 0.4, 48, 24), "threads");
+  const FittedObject one = fit(file, {.error = 0.03, .particles = 20, .threads = 1}), three = fit(file, {.error = 0.03, .particles = 20, .threads = 3});
+  EXPECT_EQ(object_text(one, "torus"), object_text(three, "torus"));
+  EXPECT_EQ(one.surface.position, three.surface.position);
+  EXPECT_EQ(one.report.to_data.largest, three.report.to_data.largest);
+}
+
+TEST(Fit, ClosesSmallHolesAndTurnsTriangles) {
+  Mesh mesh = test::octahedral_sphere(1.0, 4);
+  mesh.triangle.resize(mesh.triangle.size() - 3);
+  for (auto& t : mesh.triangle) std::swap(t[0], t[1]);
+  const FittedObject object = fit(test::saved(mesh, "holes"), {.error = 0.03, .particles = 1});
+  EXPECT_GE(object.report.repair.holes, 1U);
+  EXPECT_GT(object.report.repair.closed_area, 0.0);
+  EXPECT_TRUE(object.report.repair.turned);
+  EXPECT_TRUE(object.report.within);
+}
+
+}  // namespace
+}  // namespace supple::fit
