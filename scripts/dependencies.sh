@@ -11,7 +11,7 @@ declare -A supple_packages=(
   [run]="libosmesa6 libegl1 libgl1-mesa-dri ffmpeg"
   [test]="libgtest-dev libcgal-dev libopenvdb-tools"
   [python]="pybind11-dev python3-dev python3-numpy python3-venv"
-  [check]="clang clang-tidy"
+  [check]="clang clang-tidy libclang-rt-dev"
   [docs]="doxygen python3-venv"
   [deb]="dpkg-dev mmdebstrap"
 )

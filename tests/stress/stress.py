@@ -100,12 +100,12 @@ def asked_in_words(row):
     return f"{row.asked:,} {row.unit}" if row.asked > 1 else f"all {row.unit}"
 
 
-def report_line(row, context, outcome, seconds):
+def report_line(row, context, outcome, seconds, at_commit):
     command = f"`scripts/stress.sh {row.name} --seed {context.seed}" + ("" if row.fixed or context.share == 1.0 else f" --share {context.share:g}") + "`"
     asked = asked_in_words(row)
     today = datetime.date.today().isoformat()
     note = f" ({outcome.note})" if outcome.note else ""
-    return f"| {row.name} | {row.what} | {asked} | {outcome.reached:,}{note} | {len(outcome.faults)} | {seconds:.0f} | {today}, {commit()} | {command} |"
+    return f"| {row.name} | {row.what} | {asked} | {outcome.reached:,}{note} | {len(outcome.faults)} | {seconds:.0f} | {today}, {at_commit} | {command} |"
 
 
 HEAD = """# Reliability
@@ -132,13 +132,13 @@ def write_report(lines):
 
 def run_rows(rows, context, report):
     """Runs rows, some at the same time: they are judged by processor time, and have folders of their own. @return whether one failed"""
-    lines, failed = {}, False
+    lines, failed, at_commit = {}, False, commit()
     with concurrent.futures.ThreadPoolExecutor(context.jobs) as pool:
         running = {pool.submit(run_row, row, context): row for row in rows}
         for done in concurrent.futures.as_completed(running):
             row, (asked, outcome, seconds) = running[done], done.result()
             tell(row, asked, outcome, seconds)
-            lines[row.name] = report_line(row, context, outcome, seconds)
+            lines[row.name] = report_line(row, context, outcome, seconds, at_commit)
             failed = failed or bool(outcome.faults)
             if report:
                 write_report(lines)  # at once: what follows may take long
