@@ -131,11 +131,12 @@ FOOT = """
 - **OpenVDB files.** No command reads them. A damaged file is exported again from the saved states.
 - **Fuzzing led by coverage.** It needs clang. `scripts/test.sh` replays the corpora with changes. `scripts/check_all.sh sanitizers` runs each target for a minute,
   and `scripts/stress.sh libfuzzer` for an hour.
-- **Sanitizers.** `scripts/test.sh` runs core, implicit and collision with those of GCC. `scripts/check_all.sh sanitizers` runs all modules and the tool with those of clang.
+- **Sanitizers.** `scripts/test.sh` runs core, implicit and collision with those of GCC. `scripts/check_all.sh sanitizers` builds all modules and the tool with those of clang.
+  [checks.md](checks.md) names the version for which it passed; without a line there it has not been run.
 - **Bits of other builds.** Results are the same for any number of threads, but not for another compiler. A run continues only from states of its own build.
-- **Other numbers of particles.** Explicit steps apply the friction law pair by pair, so another order changes the result by the error of the step. The row `invariance` leaves
+- **Order of particles.** Explicit steps apply the friction law pair by pair, so another order changes the result by the error of the step. The row `invariance` leaves
   this law out.
-- **Bodies nobody reaches.** A finished run is drawn again with another obstacle only if the scene says that nothing touches it (`collide: false`). Whether something would have
+- **Obstacles out of reach.** A finished run is drawn again with another obstacle only if the scene says that nothing touches it (`collide: false`). Whether something would have
   reached it is not computed.
 """
 
