@@ -20,7 +20,6 @@ chose() { [[ $chosen == *" $1 "* ]]; }
 
 logs=$supple_root/build/logs
 clang_build=$supple_root/build/clang
-sanitizer_build=$supple_root/build/asan_clang
 
 # Without precompiled headers: clang cannot read those of GCC, and every file must include what it uses.
 configure_clang() {
@@ -38,11 +37,7 @@ analyse() {
 }
 
 # All modules and the tool; the tests run each fuzz target for a minute.
-build_sanitizers() {
-  cd "$supple_root" && cmake --preset asan -B "$sanitizer_build" -DCMAKE_CXX_COMPILER=clang++ -DSUPPLE_FUZZ=ON \
-    -DSUPPLE_MODULES="core;implicit;collision;render;scenes" -DSUPPLE_BUILD_TOOL=ON && cmake --build "$sanitizer_build"
-}
-test_sanitizers() { ctest --test-dir "$sanitizer_build" -j "$supple_jobs" --output-on-failure --no-tests=error; }
+test_sanitizers() { cd "$supple_root" && ctest --preset asan_clang -j "$supple_jobs" --no-tests=error; }
 
 test_tsan() {
   cd "$supple_root" && TSAN_OPTIONS="suppressions=$here/tsan_suppressions.txt ignore_noninstrumented_modules=1 halt_on_error=1" \
@@ -61,7 +56,7 @@ fi
 ! chose analysis || part "static analysis" "$logs/analysis.log" analyse || true
 if ! chose sanitizers; then
   :
-elif part "build (clang's sanitizers)" "$logs/build_asan_clang.log" build_sanitizers; then
+elif part "build (clang's sanitizers)" "$logs/build_asan_clang.log" configure_and_build asan_clang all; then
   part "tests (clang's sanitizers)" "$logs/tests_asan_clang.log" test_sanitizers || true
 else
   skip_part "tests (clang's sanitizers)" "no build"

@@ -10,6 +10,9 @@ NO_PICTURES = (TINY[0], [word for word in TINY[1] if not word.startswith("output
 # Pictures by the path tracer, which is ours, and grids by OpenVDB.
 TRACED = (TINY[0], [word for word in TINY[1] if not word.startswith(("output.mesh", "output.particles", "output.contacts"))]
           + ["render.renderer=path", "render.most_samples=4", "output.grid=vdb"])
+LONGER = [(scene, ["duration=0.1", *words[1:]]) for scene, words in (TINY, TRACED)]
+# A film, pictures of two formats, and even samples.
+FILMED = (TINY[0], ["duration=0.05", "output.images.size=[32,24]", "output.images.samples=1", "output.images.formats=[png,exr]", "output.samples=csv"])
 KINDS = ("eio", "enospc", "short", "eintr")
 
 
@@ -36,24 +39,30 @@ def judge(run, out, ended, where, same):
     return [f"{where}: {text}" for text in faults]
 
 
-def failing_io(context, asked, kinds=KINDS):
+def failing_io(context, asked, kinds=KINDS, settings=(*LONGER, FILMED)):
     outcome = Outcome()
-    base = context.folder("io")
-    run = SmallRun(context, *TINY, base / "reference")
     library = str(context.build / "lib/libio_failure.so")
-    out, count = base / "out", base / "calls"
-    ended = run_process(run.command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_IO_UNDER": str(out), "SUPPLE_FAIL_IO_COUNT": str(count)})
-    if ended.code != 0:
-        raise RuntimeError(f"the run that counts calls ended with {ended.code}: {ended.err}")
-    total = int(count.read_text())
-    turns = [(kind, number) for number in spread(total, max(1, asked // len(kinds))) for kind in kinds]
-    for kind, number in turns:
-        shutil.rmtree(out, ignore_errors=True)
-        env = {"LD_PRELOAD": library, "SUPPLE_FAIL_IO_UNDER": str(out), "SUPPLE_FAIL_IO_KIND": kind, "SUPPLE_FAIL_IO_AT": str(number)}
-        ended = run_process(run.command(out), env)
-        outcome.faults += judge(run, out, ended, f"{kind} at call {number}", kind in ("short", "eintr"))
-        outcome.reached += 1
-    outcome.note = f"a run makes {total} calls; {len(kinds)} kinds of failure"
+    runs, totals = [], []
+    for k, words in enumerate(settings):
+        base = context.folder(f"io_{k}")
+        runs.append(SmallRun(context, *words, base / "reference"))
+        out, count = base / "out", base / "calls"
+        ended = run_process(runs[-1].command(out), {"LD_PRELOAD": library, "SUPPLE_FAIL_IO_UNDER": str(out), "SUPPLE_FAIL_IO_COUNT": str(count)})
+        if ended.code != 0:
+            raise RuntimeError(f"the run that counts calls ended with {ended.code}: {ended.err}")
+        totals.append(int(count.read_text()))
+    calls = [(run, number) for run, total in zip(runs, totals) for number in range(1, total + 1)]
+    for place in spread(len(calls), max(1, asked // len(kinds))):
+        run, number = calls[place - 1]
+        out = run.reference.parent / "out"
+        for kind in kinds:
+            shutil.rmtree(out, ignore_errors=True)
+            env = {"LD_PRELOAD": library, "SUPPLE_FAIL_IO_UNDER": str(out), "SUPPLE_FAIL_IO_KIND": kind, "SUPPLE_FAIL_IO_AT": str(number)}
+            ended = run_process(run.command(out), env)
+            outcome.faults += judge(run, out, ended, f"{out}, {kind} at call {number}", kind in ("short", "eintr"))
+            outcome.reached += 1
+    outcome.faults += [f"still running: {text}" for run in runs for text in orphans(run.reference.parent)]
+    outcome.note = f"{len(runs)} runs make {' + '.join(map(str, totals))} calls; {len(kinds)} kinds of failure"
     return outcome
 
 

@@ -81,10 +81,10 @@ def mutated_by_tool(context, asked):
             passed += 1
             out = folder / "out"
             shutil.rmtree(out, ignore_errors=True)
-            # The scene as it is; the signal comes after seconds, and the run has a minute to end by it.
-            ended = run_process(["timeout", "--signal=INT", "--kill-after=60", "3", context.tool, "run", path, "--out", out, "--progress", "none", "--threads", 1,
+            # The scene as it is; the signal comes after seconds, and the run has a minute to end by it, or has just ended by itself.
+            ended = run_process(["timeout", "--preserve-status", "--signal=INT", "--kill-after=60", "3", context.tool, "run", path, "--out", out, "--progress", "none", "--threads", 1,
                                  "--set", "output.images=false", "--set", "output.film=false"], memory=RUN_MEMORY)
-            fault = fault_of_exit(ended, {0, 3, 4, 5, 6, 124, 130})
+            fault = fault_of_exit(ended, {0, 3, 4, 5, 6, 130})
             fault = fault or "; ".join(f"a temporary file is left: {name.name}" for name in out.rglob("*.tmp"))
         outcome.reached += 1
         outcome.faults += [f"{path}: {text}" for text in [fault] if text]

@@ -108,24 +108,34 @@ def races(context, asked):
     return outcome
 
 
+def without_pictures(run, out):
+    """A copy of an undisturbed run without what it drew. @return its folder"""
+    shutil.copytree(run.reference, out)
+    shutil.rmtree(out / "frames")
+    for made in [*out.glob("*.mp4"), *out.glob("*_sheet.png")]:
+        made.unlink()
+    return out
+
+
 def shards(context, asked):
     """Processes that draw frames of one run at the same time, in ranges that overlap; some are killed, and one more draws what is missing."""
     outcome, pick = Outcome(), context.random("shards")
     runs = small_runs(context, "shards", KILLED[:2])
+    drawing_s = []  # of one process that draws all frames
+    for k, run in enumerate(runs):
+        begin = time.monotonic()
+        run_process(run.command(without_pictures(run, context.scratch / "shards" / f"timed_{k}"), verb="render"))
+        drawing_s.append(time.monotonic() - begin)
     for turn in range(4 * asked):
         if outcome.reached >= asked:
             break
         run = runs[turn % len(runs)]
-        out = context.scratch / "shards" / f"out_{turn}"
-        shutil.copytree(run.reference, out)
-        shutil.rmtree(out / "frames")
-        for made in [*out.glob("*.mp4"), *out.glob("*_sheet.png")]:
-            made.unlink()
+        out = without_pictures(run, context.scratch / "shards" / f"out_{turn}")
         count = pick.choice([2, 3, 4])
         size = run.frames // count + 1
         ranges = [f"{max(1, k * size - pick.choice([0, 2]))}-{(k + 1) * size}" for k in range(count)]
         processes = [start(run.command(out, "--frames", frames, verb="render")) for frames in ranges]
-        time.sleep(pick.uniform(0.0, run.seconds))
+        time.sleep(pick.uniform(0.0, 0.7 * drawing_s[turn % len(runs)]))
         for process in processes[: pick.choice([1, count - 1])]:
             process.kill()
         where = f"{run.name}, shards {turn}"

@@ -11,6 +11,7 @@
 #include "io/number_text.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/core/io/number_range.h"
 
 namespace supple::io {
 namespace {
@@ -179,6 +180,14 @@ std::vector<Vec3> read_points_csv(const std::filesystem::path& path, std::size_t
                                             .expected = "expected at most " + std::to_string(most) + " points",
                                             .found = "one more",
                                             .hint = "divide them among several files"});
+      }
+      if (!(point.cwiseAbs().maxCoeff() <= kLargestNumber)) {
+        faults.push_back(Fault{.place = path.string() + ':' + std::to_string(number),
+                               .key = {},
+                               .expected = "expected three numbers up to 1e50 in size",
+                               .found = '\'' + std::string(line.substr(0, 60)) + '\'',
+                               .hint = {}});
+        if (faults.size() == kMaxFaults) break;
       }
       points.push_back(point);
     } else if (header_allowed && swaps_axes(line)) {

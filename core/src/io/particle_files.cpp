@@ -8,9 +8,11 @@
 #include <span>
 #include <system_error>
 
+#include "io/number_text.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/mesh_files.h"
+#include "supple/core/io/number_range.h"
 
 namespace supple::io {
 namespace {
@@ -78,6 +80,7 @@ class Groups {
       }
     }
     if (!columns.empty() && columns.size() < N) refuse_file(place_, "expected all columns of a group", "none named " + missing);
+    for (std::size_t k = 0; k < columns.size(); ++k) expect_sizes(names[k], columns[k]);
     return columns;
   }
   std::vector<Vec3> vectors(const std::array<std::string_view, 3>& names) const {
@@ -89,8 +92,8 @@ class Groups {
   std::vector<double> positive(std::string_view name) const {
     const auto columns = take(std::array{name});
     if (columns.empty()) return {};
-    const auto bad = std::find_if_not(columns[0].begin(), columns[0].end(), [](double v) { return v > 0.0; });
-    if (bad != columns[0].end()) fail(bad - columns[0].begin(), "expected '" + std::string(name) + "' > 0", std::to_string(*bad));
+    const auto bad = std::find_if_not(columns[0].begin(), columns[0].end(), [](double v) { return v >= kSmallestNumber; });
+    if (bad != columns[0].end()) fail(bad - columns[0].begin(), "expected '" + std::string(name) + "' > 0" + (*bad > 0.0 ? ", at least 1e-50" : ""), text_of(*bad));
     return {columns[0].begin(), columns[0].end()};
   }
   [[noreturn]] void fail(std::ptrdiff_t particle, std::string expected, std::string found) const {
@@ -98,6 +101,16 @@ class Groups {
   }
 
  private:
+  static std::string text_of(double value) {
+    std::string text;
+    append_number(text, value);
+    return text;
+  }
+  void expect_sizes(std::string_view name, std::span<const double> column) const {
+    const auto bad = std::find_if_not(column.begin(), column.end(), [](double v) { return std::abs(v) <= kLargestNumber; });
+    if (bad != column.end()) fail(bad - column.begin(), "expected '" + std::string(name) + "' up to 1e50 in size", text_of(*bad));
+  }
+
   const NumberTable& table_;
   const std::string& place_;
 };

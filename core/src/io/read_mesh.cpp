@@ -12,9 +12,11 @@
 #include <type_traits>
 #include <vector>
 
+#include "io/number_text.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
+#include "supple/core/io/number_range.h"
 #include "supple/core/io/particle_files.h"
 
 namespace supple::io {
@@ -334,6 +336,24 @@ Mesh read_ply(std::string_view text, const std::string& path) {
   return mesh;
 }
 
+/// A mesh as long as 1e-50 m to 1e50 m; vertices that no face uses do not count.
+void expect_sizes(const Mesh& mesh, const std::string& place) {
+  Box box;
+  for (const auto& t : mesh.triangle) {
+    for (const std::uint32_t v : t) box.include(mesh.position[v]);
+  }
+  const double largest = std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff()), side = box.extent().maxCoeff();
+  std::string found;
+  if (!(largest <= kLargestNumber)) {
+    append_number(found, largest);
+    refuse(place, "expected coordinates up to 1e50 m in size", found + " m");
+  }
+  if (side > 0.0 && side < kSmallestNumber) {
+    append_number(found, side);
+    refuse(place, "expected a mesh whose longest side is at least 1e-50 m", found + " m");
+  }
+}
+
 }  // namespace
 
 NumberTable read_ply_vertices(const std::filesystem::path& path) {
@@ -373,6 +393,7 @@ Mesh read_mesh(const std::filesystem::path& path) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   Mesh mesh = extension == ".obj" ? read_obj(text, path.string()) : read_ply(text, path.string());
   if (mesh.triangle.empty()) refuse(path.string(), "expected a mesh with faces", "none");
+  expect_sizes(mesh, path.string());
   return mesh;
 }
 

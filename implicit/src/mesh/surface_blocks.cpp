@@ -2,10 +2,14 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <queue>
 
 #include "mesh/partition/polygonise_blocks.h"
+#include "mesh/partition/range_of_surface.h"
 #include "supple/core/error.h"
 #include "supple/implicit/mesh_limits.h"
 
@@ -19,6 +23,7 @@ constexpr std::size_t kSamples = 8, kSampled = 128;  // of a level with more, an
 constexpr double kSpreads = 6.0, kFarTooMany = 1.25;  // below their mean, samples leave no doubt; of the limit
 constexpr double kHopeless = 1000.0;                  // times the limit: two samples that both count so many leave no doubt either
 constexpr double kLargestNode = 1 << 30;
+constexpr std::size_t kMostOutermost = 60'000;  // boxes that are halved for a side of a range
 
 /// A cube of 2^level blocks, in units of its own size, with its candidates.
 struct Cube {
@@ -42,6 +47,54 @@ Box world_box(const BlockBox& blocks, const Lattice& lattice, int last_node) {
   return {node_position(lattice, node(blocks.lower[0], 0), node(blocks.lower[1], 0), node(blocks.lower[2], 0)),
           node_position(lattice, node(blocks.upper[0], last_node), node(blocks.upper[1], last_node),
                         node(blocks.upper[2], last_node))};
+}
+
+/// The first cubes of a range: the fewest that hold it, at most two along an axis. @return their size
+int first_cubes(const BlockRange& range, std::vector<Cube>& cubes) {
+  int size = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    while ((range.upper[k] >> size) - (range.lower[k] >> size) > 1) ++size;
+  }
+  for (std::int32_t z = range.lower[2] >> size; z <= range.upper[2] >> size; ++z) {
+    for (std::int32_t y = range.lower[1] >> size; y <= range.upper[1] >> size; ++y) {
+      for (std::int32_t x = range.lower[0] >> size; x <= range.upper[0] >> size; ++x) cubes.push_back({.at = {x, y, z}});
+    }
+  }
+  return size;
+}
+
+/// A cube's child of half the size.
+Cube child_of(const Cube& cube, unsigned corner) {
+  Cube child = cube;
+  for (std::size_t k = 0; k < 3; ++k) child.at[k] = 2 * cube.at[k] + static_cast<std::int32_t>(corner >> k & 1u);
+  return child;
+}
+
+/// The outermost block along an axis that is kept, as are the cubes around it, times `side` (1 or -1). None where no block is, or where many boxes lie equally far
+/// out, as on a flat face.
+std::optional<std::int32_t> outermost(const BlockRange& range, std::size_t axis, std::int32_t side, const std::function<bool(const Cube&, int)>& keeps) {
+  struct Open {
+    std::int32_t out;  // its outermost block, times the side
+    int size;
+    Cube cube;
+    bool operator<(const Open& other) const { return out != other.out ? out < other.out : size > other.size; }
+  };
+  std::priority_queue<Open> open;
+  const auto add = [&](const Cube& cube, int size) {
+    if (!keeps(cube, size)) return;
+    const BlockBox blocks = blocks_of(cube.at, size, range);
+    open.push({side > 0 ? blocks.upper[axis] : -blocks.lower[axis], size, cube});
+  };
+  std::vector<Cube> first;
+  const int size = first_cubes(range, first);
+  for (const Cube& cube : first) add(cube, size);
+  for (std::size_t halved = 0; !open.empty() && halved < kMostOutermost; ++halved) {
+    const Open now = open.top();
+    if (now.size == 0) return now.out;
+    open.pop();
+    for (unsigned corner = 0; corner < 8; ++corner) add(child_of(now.cube, corner), now.size - 1);
+  }
+  return std::nullopt;
 }
 
 /// Result of one task of a level.
@@ -104,8 +157,7 @@ void halve(LevelPart& level, int size, const BlockRange& range) {
   children.reserve(8 * level.cube.size());
   for (const Cube& cube : level.cube) {
     for (unsigned corner = 0; corner < 8; ++corner) {
-      Cube child = cube;
-      for (std::size_t k = 0; k < 3; ++k) child.at[k] = 2 * cube.at[k] + static_cast<std::int32_t>(corner >> k & 1u);
+      const Cube child = child_of(cube, corner);
       const BlockBox blocks = blocks_of(child.at, size, range);
       if (!BlockRange{blocks.lower, blocks.upper}.empty()) children.push_back(child);
     }
@@ -271,20 +323,11 @@ BlockList refine_blocks(const BlockRange& range, const Lattice& lattice, std::ui
   BlockList list;
   list.offset.push_back(0);
   if (range.empty()) return list;
-  int size = 0;  // the first cubes are the fewest that hold the range, at most two along an axis
-  for (std::size_t k = 0; k < 3; ++k) {
-    while ((range.upper[k] >> size) - (range.lower[k] >> size) > 1) ++size;
-  }
   LevelPart level;
   level.candidate.resize(bodies);
   std::iota(level.candidate.begin(), level.candidate.end(), 0u);
-  for (std::int32_t z = range.lower[2] >> size; z <= range.upper[2] >> size; ++z) {
-    for (std::int32_t y = range.lower[1] >> size; y <= range.upper[1] >> size; ++y) {
-      for (std::int32_t x = range.lower[0] >> size; x <= range.upper[0] >> size; ++x) {
-        level.cube.push_back({.at = {x, y, z}, .first = 0, .count = bodies});
-      }
-    }
-  }
+  const int size = first_cubes(range, level.cube);
+  for (Cube& cube : level.cube) cube.count = bodies;
   Refinement refinement(range, lattice, executor, options, decide);
   refinement.refine(std::move(level), size);
   LevelPart& found = refinement.found();
@@ -338,6 +381,28 @@ BlockList find_label_blocks(std::span<const FieldView> fields, std::span<const B
   };
   return refine_blocks(range, lattice, static_cast<std::uint32_t>(fields.size()), executor,
                        {.limit = limit, .look_factor = 4, .keep_inside = true}, decide);
+}
+
+std::optional<BlockRange> range_of_surface(const FieldView& field, const Lattice& lattice) {
+  const Box surface = field.surface_box();
+  const BlockRange range = block_range(surface, lattice, 1);
+  const auto keeps = [&](const Cube& cube, int size) {
+    const BlockBox blocks = blocks_of(cube.at, size, range);
+    if (BlockRange{blocks.lower, blocks.upper}.empty()) return false;
+    const Box box = world_box(blocks, lattice, kCells);
+    if (!surface.overlaps(box)) return false;
+    const Interval value = field.bound(box);
+    return value.upper > 0.0 && !(value.lower > 0.0);
+  };
+  BlockRange out = range;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::optional<std::int32_t> last = outermost(range, axis, 1, keeps);
+    const std::optional<std::int32_t> first = last ? outermost(range, axis, -1, keeps) : std::nullopt;
+    if (!first) return std::nullopt;
+    out.upper[axis] = *last;
+    out.lower[axis] = -*first;
+  }
+  return out;
 }
 
 BlockList surface_blocks(const FieldView& field, const Lattice& lattice, const Executor& executor, std::uint64_t limit,

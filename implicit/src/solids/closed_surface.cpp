@@ -381,6 +381,7 @@ class Boundary {
   void part(std::uint32_t of, const Flat& whole) {
     std::vector<Flat> pieces{whole};
     while (!pieces.empty()) {
+      heed_scope();
       const Flat piece = pieces.back();
       pieces.pop_back();
       std::size_t longest = 0;

@@ -180,7 +180,8 @@ std::string scene_reference() {
   std::string out =
       "# Scene files\n\n"
       "Scenes are YAML, so JSON works too. Bare numbers are in SI units; `\"5 cm\"`, `\"2 ms\"`, `\"3 kN\"` are converted, and their dimension is\n"
-      "checked. Numbers are 0 or between 1e-50 and 1e50 in size, and may be fractions: `30000/1001`, `5/8 in`. Keys that end in\n"
+      "checked. Numbers are 0 or between 1e-50 and 1e50 in size, and may be fractions: `30000/1001`, `5/8 in`; those\n"
+      "in tables and meshes are at most 1e50 in size, too. Keys that end in\n"
       "`_deg` are in degrees. `true` and `false` may be written `True`, `TRUE`, `False`, `FALSE`.\n"
       "`--set objects.ball.particles.mass=2` overrides any key. `supple reference` generates this page.\n\n";
   write_units(out);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "file/read_scene_faults.h"
+#include "supple/core/io/number_range.h"
 
 namespace supple::scenes {
 namespace {
@@ -83,12 +84,10 @@ const Unit* find_unit(std::string_view name) {
   return unit == kUnits.end() ? nullptr : unit;
 }
 
-/// Of numbers that are not zero: products of six of them are still finite, and so are their inverses.
-constexpr double kSmallest = 1e-50, kLargest = 1e50;
 constexpr const char* kRangeHint = "numbers are 0 or between 1e-50 and 1e50 in size";
 
 bool in_range(double value) {
-  return value == 0.0 || (std::abs(value) >= kSmallest && std::abs(value) <= kLargest);
+  return value == 0.0 || (std::abs(value) >= io::kSmallestNumber && std::abs(value) <= io::kLargestNumber);
 }
 
 bool digit(char c) { return c >= '0' && c <= '9'; }

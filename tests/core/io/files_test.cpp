@@ -211,6 +211,14 @@ TEST_F(Files, OfPointsNameEveryLineThatIsNotThreeNumbers) {
     EXPECT_EQ(error.faults()[0].message(), path("p.csv").string() + ":2: expected three finite numbers, found '1,2'");
     EXPECT_EQ(error.faults()[5].place, path("p.csv").string() + ":7");
   }
+  io::write_atomically(path("p.csv"), std::string_view("1e50,-1e50,1e-300\n1,2,-1e51\n"));
+  try {
+    static_cast<void>(io::read_points_csv(path("p.csv")));
+    FAIL();
+  } catch (const Error& error) {
+    ASSERT_EQ(error.faults().size(), 1U);
+    EXPECT_EQ(error.faults()[0].message(), path("p.csv").string() + ":2: expected three numbers up to 1e50 in size, found '1,2,-1e51'");
+  }
   expect_error(ErrorKind::Io, "none.csv", [&] { static_cast<void>(io::read_points_csv(path("none.csv"))); });
 }
 

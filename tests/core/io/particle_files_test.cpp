@@ -72,6 +72,10 @@ TEST_F(ParticleFiles, SayWhatIsWrong) {
   EXPECT_NE(fault("a.csv", "x,y,z,mass\n1,2,3,0\n").find("expected 'mass' > 0"), std::string::npos);
   EXPECT_NE(fault("a.csv", "x,y,z,mass\n1,2,3\n").find("a.csv:2: expected 4 numbers"), std::string::npos) << fault("a.csv", "x,y,z,mass\n1,2,3\n");
   EXPECT_NE(fault("a.csv", "x,y,z,mass\n1,2,nan,1\n").find("expected finite numbers"), std::string::npos);
+  EXPECT_NE(fault("a.csv", "x,y,z,mass\n1,2,3,1e51\n").find("expected 'mass' up to 1e50 in size, found 1e+51 of particle 0"), std::string::npos);
+  EXPECT_NE(fault("a.csv", "x,y,z,radius\n1,2,3,1e-51\n").find("expected 'radius' > 0, at least 1e-50, found 1e-51"), std::string::npos);
+  EXPECT_NE(fault("a.csv", "x,y,z,vx,vy,vz\n0,0,0,1,1,1\n0,0,0,0,-1e51,0\n").find("expected 'vy' up to 1e50 in size, found -1e+51 of particle 1"), std::string::npos);
+  EXPECT_EQ(fault("a.csv", "x,y,z,vx,vy,vz\n1e-300,0,1e50,-1e50,1e-300,0\n"), "accepted");
   EXPECT_NE(fault("a.csv", "x,y,z,nx,ny,nz\n1,2,3,0,0,0\n").find("normal that is not zero"), std::string::npos);
   EXPECT_NE(fault("a.csv", "a,b,c,d\n1,2,3,4\n").find("expected columns x, y and z"), std::string::npos);
   EXPECT_NE(fault("a.csv", "x,y,z,mass\n1,2,3,1\n1,2,4,1\n1,2,5,1\n1,2,6,1\n").find("at most 3 particles"), std::string::npos);

@@ -145,6 +145,17 @@ TEST_F(ReadMesh, CutsFacesWithCornersThatPointInwardsIntoWhatTheyHold) {
   }
 }
 
+TEST_F(ReadMesh, RefusesMeshesBeyondTheRangeOfNumbers) {
+  const auto triangle = [](const std::string& side, const std::string& stray) {
+    return "v 0 0 0\nv " + side + " 0 0\nv 0 " + side + " 0\nv " + stray + " 0 0\nf 1 2 3\n";
+  };
+  expect_refused("a.obj", triangle("-1e51", "0"), "a.obj: expected coordinates up to 1e50 m in size, found 1e+51 m");
+  expect_refused("a.obj", triangle("1e-51", "1"), "a.obj: expected a mesh whose longest side is at least 1e-50 m, found 1e-51 m");
+  for (const char* side : {"1e50", "1e-50"}) {
+    EXPECT_EQ(read_mesh(file("a.obj", triangle(side, "1e60"))).triangle.size(), 1u) << side;
+  }
+}
+
 TEST_F(ReadMesh, SaysWhereAFileIsNotAMesh) {
   expect_refused("a.obj", "v 0 0\n", "a.obj:1: expected 'v' and three finite numbers, found 'v 0 0'");
   expect_refused("a.obj", "v 0 0 0\nf 1 2 3\n", "a.obj:2: expected 'f' and numbers of vertices above it");

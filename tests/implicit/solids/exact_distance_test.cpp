@@ -4,12 +4,17 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <thread>
 #include <utility>
 
+#include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/core/math.h"
 #include "supple/implicit/mesh_solid.h"
 #include "supple/implicit/solids.h"
@@ -176,6 +181,22 @@ TEST(ExactDistance, HasTheCavityThatAShellTheOtherWayRoundBounds) {
     EXPECT_EQ(filled.surface().triangle.size(), 12u);
     for (const Vec3& x : all) EXPECT_NEAR(value(filled, x), value(alone, x), 1e-14);
   }
+}
+
+// A comb of forty blades: the two triangles of its back cross all of them and are cut into hundreds of thousands of pieces, which takes seconds.
+TEST(ExactDistance, OfShellsThatCrossInManyPlacesIsInterruptedWithinATriangle) {
+  constexpr int kBlades = 40;
+  Mesh comb = block(Vec3(0.5, 0.5, 0.05));
+  for (int k = 0; k < kBlades; ++k) comb = both(comb, block(Vec3(0.001, 0.5, 0.2), Vec3(-0.49 + k * 0.025, 0, 0.2)));
+  std::atomic<int> interrupt{0};
+  const InterruptScope scope(&interrupt);
+  std::jthread signal([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    interrupt = 2;
+  });
+  const double began = process_cpu_seconds();
+  EXPECT_THROW((void)closed_surface(comb), Interrupted);
+  EXPECT_LT(process_cpu_seconds() - began, 0.5);
 }
 
 TEST(ExactDistance, IsTheUnionOfShellsThatCross) {

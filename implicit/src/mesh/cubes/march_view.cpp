@@ -1,8 +1,10 @@
 #include <immintrin.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "mesh/cubes/march_changes.h"
 #include "mesh/partition/polygonise_block_edges.h"
 #include "mesh/partition/polygonise_blocks.h"
+#include "mesh/partition/range_of_surface.h"
 #include "supple/implicit/project.h"
 
 namespace supple::implicit::march {
@@ -54,6 +57,18 @@ class ViewSampler final : public Sampler {
   void expect_size(const Executor& executor) override {
     // As many leaves in any order have fewer nodes than fit.
     if (lattice::block_range(field_.surface_box(), lattice_, 1).count() <= kMostLeaves) return;
+    if (const std::optional<lattice::BlockRange> around = lattice::range_of_surface(field_, lattice_)) {
+      if (around->count() <= kMostLeaves) return;
+      // Leaves are listed only where a surface as large as a side of that box has too many of them: other boxes have too many nodes first.
+      std::array<std::uint64_t, 3> side;
+      for (std::size_t k = 0; k < 3; ++k) side[k] = static_cast<std::uint64_t>(std::int64_t{around->upper[k]} - around->lower[k] + 1);
+      std::sort(side.begin(), side.end());
+      if (side[1] * side[2] <= kMostLeaves) {
+        const std::array<BlockCoord, 2> ends{around->lower, around->upper};
+        const auto [lower, upper] = nodes_of(ends);
+        expect_nodes(lower, upper, lattice_);
+      }
+    }
     const std::vector<BlockCoord> leaves = find_leaves(executor).block;
     if (leaves.empty()) return;
     const auto [lower, upper] = nodes_of(leaves);

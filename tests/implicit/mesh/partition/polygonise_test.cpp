@@ -9,6 +9,7 @@
 #include "implicit/bodies.h"
 #include "implicit/mesh_checks.h"
 #include "mesh/partition/polygonise_blocks.h"
+#include "mesh/partition/range_of_surface.h"
 #include "mesh/partition/polygonise_lattice.h"
 
 namespace supple::implicit {
@@ -289,6 +290,30 @@ TEST(Polygonise, ReportsBoundsThatHideTheSurfaceInsteadOfLeavingAHole) {
   const std::vector<FieldView> views{ball, ball};
   expect_message([&] { (void)polygonise_partition(views, lattice_of(0.03), Executor(1)); }, ErrorKind::Internal,
                  {"surface in block", "bounds exclude"});
+}
+
+TEST(SurfaceBlocks, LieInTheRangeThatIsFoundWithoutThem) {
+  const auto expect_range = [](const FieldView& field, double cell, const std::string& name) {
+    const auto blocks = find_surface_blocks(field, lattice_of(cell), Executor(2), 1'000'000);
+    ASSERT_FALSE(blocks.empty()) << name;
+    std::array<std::int32_t, 3> lower = blocks[0], upper = blocks[0];
+    for (const auto& block : blocks) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        lower[k] = std::min(lower[k], block[k]);
+        upper[k] = std::max(upper[k], block[k]);
+      }
+    }
+    const std::optional<lattice::BlockRange> range = lattice::range_of_surface(field, lattice_of(cell));
+    ASSERT_TRUE(range) << name;
+    EXPECT_EQ(range->lower, lower) << name;
+    EXPECT_EQ(range->upper, upper) << name;
+  };
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Body body = random_body({.seed = seed, .parts = 12});
+    expect_range(body.field, 0.01 + 0.004 * seed, "body " + std::to_string(seed));
+  }
+  const FunctionField small = sphere(Vec3(0.31, -0.7, 0.2), 1e-3);
+  expect_range(small, 0.05, "smaller than a cell");
 }
 
 TEST(SurfaceBlocks, HoldEverySignChangeAndComeInOrder) {
