@@ -59,7 +59,7 @@ expect 4 '--overwrite' run good.yaml --out good --progress none
 expect 0 '' --version
 expect 2 '' run
 expect 2 "supple: expected a command, found 'rn'; did you mean 'run'? (known: run, render" rn good.yaml
-expect 2 "found 'simulate'; known: run, render, export, view, sweep, job, info, compare, check, explain, query, bench, reference" simulate good.yaml
+expect 2 "found 'simulate'; known: run, render, export, view, sweep, fit, job, info, compare, check, explain, query, bench, reference" simulate good.yaml
 expect 2 "supple: expected an option, found '--verson'; did you mean '--version'?" --verson
 expect 2 "supple run: expected an option, found '--thread'; did you mean '--threads'?" run good.yaml --thread 2
 expect 2 "supple run: expected an option, found '-out'; did you mean '--out'?" run -out elsewhere good.yaml
@@ -395,6 +395,7 @@ run=$!
 for ((k = 0; k < 500; ++k)); do [[ -e killed/point_0002/row.json ]] && break; sleep 0.02; done
 kill -9 "$run"
 wait "$run" 2> /dev/null
+touch killed/point_0002/.row.json.1.0.tmp
 expect 0 '' sweep killed --progress none
 cmp -s sweep/table.csv killed/table.csv || fault 'a sweep that was killed ends with another table'
 expect 0 '' sweep diverges.yaml --set 'objects.chain.interactions[0]=[{law: bond_frame, stretch: 1e6, rotation: 10}, {law: bond_frame, stretch: 1e-3, rotation: 1e-9}]' --out sweep_fails --progress none

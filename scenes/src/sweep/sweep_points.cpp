@@ -76,6 +76,17 @@ void write_row(const PointFiles& files, const SweepRow& row, const ordered_json&
   io::write_atomically(files.place / kRowFile, std::string_view(json.dump(1, ' ', false, ordered_json::error_handler_t::replace) + '\n'));
 }
 
+/// Removes what a process that was killed while it wrote the row has left.
+void remove_row_temporaries(const fs::path& place) {
+  std::error_code ignored;
+  std::vector<fs::path> left;
+  for (const fs::directory_entry& entry : fs::directory_iterator(place, ignored)) {
+    const std::string file = entry.path().filename().string();
+    if (file.starts_with(std::string(".") + kRowFile + '.') && file.ends_with(".tmp")) left.push_back(entry.path());
+  }
+  for (const fs::path& path : left) fs::remove(path, ignored);
+}
+
 /// Of everything that the row follows from: the build, the scene with its frames, what is written and measured.
 std::string row_fingerprint(const SweepPlan& plan, const Scene& scene) {
   Hasher hasher;
@@ -201,6 +212,7 @@ class PointRunner {
 
   SweepRow run_one(const SweepPoint& point) {
     const fs::path place = folder_ / point.folder;
+    remove_row_temporaries(place);
     SweepRow kept{.number = point.number, .outcome = {}, .reason = {}};
     const ordered_json before = read_row(place);
     if (!before.is_null() && is_kept(before, prepare(plan_, point).fingerprint, kept)) return kept;
@@ -261,6 +273,7 @@ SweepRow run_point(const fs::path& folder, int number, const PointOptions& optio
   const bool resume = !before.is_null() && before["fingerprint"] == files.fingerprint;
   write_row(files, row, ordered_json::object());
   const RunResult result = run_scene(*prepared.scene, run_options_of(plan, options, place, resume));
+  remove_row_temporaries(place);
   row.outcome = result.outcome;
   row.reason = result.reason;
   row.exit_code = result.exit_code;
