@@ -85,8 +85,8 @@ void cover_inside(const Surroundings& around, double most, std::vector<Ball>& ba
   std::vector<char> open(around.inside.size(), 1);
   std::vector<std::uint32_t> near;
   const auto close = [&](const Ball& ball) {
-    constexpr double kCovered = 0.9;  // of the radius
-    grid.within(ball.centre, kCovered * ball.radius, near);
+    constexpr double kCovered = 0.9;  // of the radius of small balls; of large ones what lies half a step inside
+    grid.within(ball.centre, std::max(kCovered * ball.radius, ball.radius - 0.5 * around.step), near);
     for (const std::uint32_t k : near) open[k] = 0;
   };
   for (const Ball& ball : balls) close(ball);

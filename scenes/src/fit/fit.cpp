@@ -289,13 +289,13 @@ void report_errors(FittedObject& object, const Data& data, const Skeleton& skele
   FitReport& report = object.report;
   implicit::Field field;
   build_field(skeleton.blobs, field);
-  object.surface = mesh_of(field, 0.5 * skeleton.cell, executor);
+  object.surface = mesh_of(field, skeleton.cell, executor);
   const MeshReport in = inspect(data.mesh), out = inspect(object.surface);
   report.genus_in = genus_of(in);
   report.genus_out = genus_of(out);
   report.pieces_out = out.components;
   report.volume_error = out.volume / in.volume - 1.0;
-  const double within = 0.01 * options.error;
+  const double within = 0.05 * options.error;
   report.from_data = measure(data.mesh, object.surface, SurfaceTree(object.surface), within, executor);
   report.to_data = measure(object.surface, data.mesh, data.tree, within, executor);
   report.within = report.two_sided() <= options.error;
