@@ -40,7 +40,7 @@ struct Repair {
 /// Distances from the points of one surface to the other, over the diagonal of the data's box.
 struct Distance {
   double rms = 0.0;      ///< of samples even in area
-  double largest = 0.0;  ///< one-sided Hausdorff distance, within a hundredth of the error asked
+  double largest = 0.0;  ///< one-sided Hausdorff distance, within a twentieth of the error asked
 };
 
 struct FitReport {
