@@ -66,7 +66,7 @@ void add_summary(Class& type) {
           "Estimate of the relative error of elastic_force, area and centre_of_pressure, the largest of the three [1].")
       .def_property_readonly(
           "rule", [](const T& p) { return scenes::rule_name(p.summary().rule); },
-          "Quadrature rule: \"polar\", \"samples\", \"march\" or \"panels\"; \"none\" where nothing touches.")
+          "Quadrature rule: \"polar\", \"march\" or \"panels\"; \"none\" where nothing touches.")
       .def_property_readonly(
           "patches", [](const T& p) { return p.summary().patches; }, "Number of contact patches.")
       .def_property_readonly(

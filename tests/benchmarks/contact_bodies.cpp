@@ -1,7 +1,7 @@
 /// @file contact_bodies.cpp
 /// Contact of bodies of many primitives, one per part, with obstacles and with each other: cost of a query and of the reactions by the number of
 /// primitives, and the true error for each given error. One JSON object per line: median and largest over random poses.
-///   contact_bodies [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--reference RULE]
+///   contact_bodies [POSES] [CASE|all] [auto|polar|march|panels] [SEED] [--reference RULE]
 /// The reference is a rule at an error of 1e-7, march unless another one is named.
 #include <cstdio>
 #include <string>
@@ -157,7 +157,7 @@ void measure(std::string_view name, int poses, collision::ContactRule rule, std:
 }  // namespace
 
 int supple::benchmarks::programs::contact_bodies(int argc, char** argv) {
-  constexpr std::string_view kUsage = "contact_bodies [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--reference RULE]";
+  constexpr std::string_view kUsage = "contact_bodies [POSES] [CASE|all] [auto|polar|march|panels] [SEED] [--reference RULE]";
   answer_usage(argc, argv, kUsage, 6, {{"--reference", 1}});
   std::vector<std::string_view> words;
   std::string_view reference_name = "march";

@@ -2,7 +2,7 @@
 /// Invariance of contact when two bodies are swapped, rotated and moved together, or scaled by 1/1000 or 1000: the largest relative
 /// change of force, area and centre of pressure over many random poses, for each case and given error, one JSON object per line.
 /// Expected is round-off only, 1e-9.
-///   contact_invariance [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED]
+///   contact_invariance [POSES] [CASE|all] [auto|polar|march|panels] [SEED]
 #include <cstdio>
 #include <string>
 #include <string_view>
@@ -16,7 +16,7 @@ int supple::benchmarks::programs::contact_invariance(int argc, char** argv) {
   using namespace supple;
   using namespace supple::benchmarks;
   constexpr std::array<double, 4> kErrors{1e-2, 1e-3, 1e-6, 1e-10};
-  constexpr std::string_view kUsage = "contact_invariance [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED]";
+  constexpr std::string_view kUsage = "contact_invariance [POSES] [CASE|all] [auto|polar|march|panels] [SEED]";
   answer_usage(argc, argv, kUsage, 4);
   const int poses = argc > 1 ? whole_number(kUsage, argv[1]) : 1000;
   const std::string_view only = argc > 2 ? argv[2] : "all", rule = argc > 3 ? argv[3] : "auto";

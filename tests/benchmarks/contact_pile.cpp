@@ -92,14 +92,13 @@ void measure(int count, bool sleeps, int threads) {
   const auto asleep = std::count_if(island.begin(), island.end(), [](std::uint32_t i) { return i != collision::SleepState::kAwake; });
   const auto& summary = simulation.contacts().summary;
   const std::size_t contacts = summary.size();
-  const auto sampled = std::count_if(summary.begin(), summary.end(),
-                                     [](const auto& s) { return s.rule == collision::ContactRule::Samples; });
+  const auto polar = std::count_if(summary.begin(), summary.end(), [](const auto& s) { return s.rule == collision::ContactRule::Polar; });
   double fastest = 0.0;
   for (const Vec3& v : simulation.state().particles.velocity) fastest = std::max(fastest, v.norm());
-  std::printf("{\"name\": \"collision/pile/balls=%zu%s,threads=%d\", \"cpu_ms_step_min\": %.4g, \"wall_ms_step_min\": %.4g, \"cpu_ms_step_mean\": %.4g, \"cpu_ms_step_falling\": %.4g, \"contacts\": %zu, \"by_samples\": %td, "
+  std::printf("{\"name\": \"collision/pile/balls=%zu%s,threads=%d\", \"cpu_ms_step_min\": %.4g, \"wall_ms_step_min\": %.4g, \"cpu_ms_step_mean\": %.4g, \"cpu_ms_step_falling\": %.4g, \"contacts\": %zu, \"by_polar\": %td, "
               "\"cpu_us_contact\": %.3g, \"asleep\": %td, \"largest_speed\": %.2g, \"made_cpu_s\": %.3g, \"peak_mb\": %.0f, \"hash\": \"%s\"}\n",
               simulation.bodies().size(), sleeps ? ",sleep" : "", threads, 1e3 * least, 1e3 * shortest, 1e3 * all / steps,
-              count < kMany ? 1e3 * falling / (kFallTo - kFallFrom) : 0.0, contacts, sampled,
+              count < kMany ? 1e3 * falling / (kFallTo - kFallFrom) : 0.0, contacts, polar,
               1e6 * least / static_cast<double>(std::max<std::size_t>(contacts, 1)), asleep, fastest, made, memory,
               to_hex(simulation.state_hash()).c_str());
   std::fflush(stdout);

@@ -5,7 +5,7 @@
 /// Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
 /// other cases are compared with the finest rule for the same bodies in another frame, which has other nodes; the error of that
 /// reference is added to the bounds. Poses whose patch is crossed by a kink of a field are listed separately.
-///   contact_poses [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]
+///   contact_poses [POSES] [CASE|all] [auto|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]
 /// --marched: where there is no closed form the reference is the rule march, which has neither rays nor panels.
 /// --all-rays: bodies of revolution get all rays, as other bodies do, instead of a single one.
 #include <cstdio>
@@ -81,7 +81,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
   constexpr int kRepeats = 10, kRounds = 3;
   struct Line {
     std::vector<double> cpu, forces, error, ratio;  // ratio: bound over error, where the reference can tell
-    int missed = 0, march = 0, sampled = 0, unmet = 0, bound_broken = 0;
+    int missed = 0, march = 0, unmet = 0, bound_broken = 0;
   };
   std::array<std::array<Line, kErrors.size()>, 2> classes;  // smooth, crossed by kinks
   struct Timed {
@@ -119,7 +119,6 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
       line.forces.push_back(query.time_forces(pair.bodies, kRepeats));
       line.error.push_back(error);
       line.march += s->rule == collision::ContactRule::March ? 1 : 0;
-      line.sampled += s->rule == collision::ContactRule::Samples ? 1 : 0;
       line.unmet += s->error_estimate > kErrors[k] ? 1 : 0;
       if (error > 10.0 * floor) line.ratio.push_back(s->error_estimate / error);
       line.bound_broken += error > s->error_estimate + floor ? 1 : 0;
@@ -151,10 +150,10 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
     const std::size_t n = line.cpu.size(), r = line.ratio.size();
     if (n == 0) continue;
     std::printf("{\"name\": \"collision/poses/%s%s/error=%g\", \"poses\": %zu, \"cpu_us_median\": %.1f, \"cpu_us_max\": %.1f, \"forces_us_median\": %.1f, "
-                "\"error\": %.2g, \"error_median\": %.2g, \"error_kind\": \"%s\", \"marched\": %d, \"sampled\": %d, \"missed\": %d, "
+                "\"error\": %.2g, \"error_median\": %.2g, \"error_kind\": \"%s\", \"marched\": %d, \"missed\": %d, "
                 "\"estimates_over\": %d, \"bounds_broken\": %d, \"bound_over_error\": %.3g, \"least_bound_over_error\": %.3g, \"hash\": \"%s\"}\n",
                 std::string(name).c_str(), i % 2 == 0 ? "" : "/kinks", kErrors[k], n, line.cpu[n / 2], line.cpu.back(), line.forces[n / 2],
-                line.error.back(), line.error[n / 2], "largest of force, area, centre", line.march, line.sampled, line.missed,
+                line.error.back(), line.error[n / 2], "largest of force, area, centre", line.march, line.missed,
                 line.unmet, line.bound_broken, r == 0 ? 0.0 : line.ratio[r / 2], r == 0 ? 0.0 : line.ratio.front(), to_hex(hasher.value()).c_str());
   }
   std::fflush(stdout);
@@ -163,7 +162,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
 }  // namespace
 
 int supple::benchmarks::programs::contact_poses(int argc, char** argv) {
-  constexpr std::string_view kUsage = "contact_poses [POSES] [CASE|all] [auto|samples|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]";
+  constexpr std::string_view kUsage = "contact_poses [POSES] [CASE|all] [auto|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]";
   answer_usage(argc, argv, kUsage, 9, {{"--all-rays"}, {"--marched"}, {"--depths", 2}});
   std::vector<std::string_view> words;
   std::optional<std::array<double, 2>> depths;

@@ -1,6 +1,6 @@
 /// @file contact_rules.cpp
-/// Time against error of the rules that sample the contact surface: along the rays of surface samples, in polar rings about
-/// the peak, in tetrahedra; each refined step by step, over the same random poses at an overlap of a tenth of the smaller
+/// Time against error of the rules that integrate over the contact surface: on panels, in polar rings about the peak, on marched
+/// triangles; for each error asked, over the same random poses at an overlap of a tenth of the smaller
 /// radius. A query is broad phase, candidates and contact surface. Errors are the largest of force, area (relative) and
 /// centre of pressure (over the root of the area), RMS over the poses, against closed forms or the finest polar rule for
 /// the bodies in another frame. The last case has ring-shaped patches. Prints tables; with a file name also writes the plot (SVG).
@@ -27,13 +27,12 @@ constexpr int kRepeats = 3;
 struct Rule {
   const char* name;
   ContactRule rule;
-  bool by_error;    // which of them is taken follows from the error asked for
-  int first, last;  // digits of that, else refinements
+  int first, last;  // digits of the error asked for
   const char* colour;
 };
-constexpr std::array<Rule, 3> kRules{{{"samples", ContactRule::Samples, false, 0, 5, "#d95f02"},
-                                      {"polar", ContactRule::Polar, true, 1, 10, "#1b9e77"},
-                                      {"march", ContactRule::March, true, 2, 8, "#7570b3"}}};
+constexpr std::array<Rule, 3> kRules{{{"panels", ContactRule::Panels, 1, 6, "#d95f02"},
+                                      {"polar", ContactRule::Polar, 1, 10, "#1b9e77"},
+                                      {"march", ContactRule::March, 2, 8, "#7570b3"}}};
 
 /// A log-log panel: error from 1e-15 to 1 across, CPU time from 1 us to 1 s upwards.
 class Panel {
@@ -105,11 +104,11 @@ Asked ask(std::span<const collision::ContactBody> bodies, const collision::Conta
 
 template <class MakePose>
 std::string measure(const char* name, double left, double top, const MakePose& make_pose) {
-  std::printf("\n## %s\n\n| rule | refinements, or error asked | points | error, RMS | error, worst | CPU us |\n|---|---|---|---|---|---|\n", name);
+  std::printf("\n## %s\n\n| rule | error asked | points | error, RMS | error, worst | CPU us |\n|---|---|---|---|---|---|\n", name);
   Panel panel(left, top, name);
   for (const Rule& rule : kRules) {
     std::vector<std::pair<double, double>> line;
-    for (int refinements = rule.first; refinements <= rule.last; ++refinements) {
+    for (int digits = rule.first; digits <= rule.last; ++digits) {
       Draw draw(7);
       double square = 0.0, worst = 0.0, points = 0.0, cpu = 0.0;
       int count = 0;
@@ -122,9 +121,7 @@ std::string measure(const char* name, double left, double top, const MakePose& m
         }
         collision::ContactSurface::Summary s;
         // All rays are followed, as bodies that are the same all around an axis would else have one that stands for them.
-        collision::ContactSettings settings{.error = 1e-10, .max_refinement = refinements, .only = rule.rule, .symmetry = false};
-        if (rule.by_error) settings = {.error = std::pow(10.0, -refinements), .only = rule.rule, .symmetry = false};
-        const Asked asked = ask(pair.bodies, settings, &s);
+        const Asked asked = ask(pair.bodies, {.error = std::pow(10.0, -digits), .only = rule.rule, .symmetry = false}, &s);
         if (!asked.found) continue;
         const double error = difference(s, pair.exact);
         square += error * error;
@@ -135,7 +132,7 @@ std::string measure(const char* name, double left, double top, const MakePose& m
       }
       if (count == 0) continue;
       const double rms = std::sqrt(square / count);
-      std::printf("| %s | %s%d | %.0f | %.1e | %.1e | %.3g |\n", rule.name, rule.by_error ? "1e-" : "", refinements, points / count, rms, worst, cpu / count);
+      std::printf("| %s | 1e-%d | %.0f | %.1e | %.1e | %.3g |\n", rule.name, digits, points / count, rms, worst, cpu / count);
       std::fflush(stdout);
       line.emplace_back(rms, cpu / count);
     }

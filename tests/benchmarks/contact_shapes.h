@@ -43,11 +43,11 @@ class Draw {
 };
 
 /// @param name  of a rule, as a command line has it; any other: the cheapest that fits
-constexpr std::array<std::string_view, 5> kRuleNames{"auto", "samples", "polar", "march", "panels"};
+constexpr std::array<std::string_view, 4> kRuleNames{"auto", "polar", "march", "panels"};
 inline collision::ContactRule rule_named(std::string_view name) {
   using collision::ContactRule;
   if (name == "panels") return ContactRule::Panels;
-  return name == "samples" ? ContactRule::Samples : name == "polar" ? ContactRule::Polar : name == "march" ? ContactRule::March : ContactRule::None;
+  return name == "polar" ? ContactRule::Polar : name == "march" ? ContactRule::March : ContactRule::None;
 }
 
 /// A body at rest. @param pose  of its parts, ten at most

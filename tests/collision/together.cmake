@@ -3,4 +3,4 @@ supple_together(
   "pairs/find_contacts_test.cpp response/motion_test.cpp response/stick_test.cpp surface/closed_forms_test.cpp
    surface/mild_kinks_test.cpp surface/star_test.cpp"
   "response/react_test.cpp surface/invariance_test.cpp surface/panels_test.cpp"
-  "surface/contact_surface_test.cpp surface/sample_rule_test.cpp")
+  "surface/contact_surface_test.cpp surface/contact_rules_test.cpp")

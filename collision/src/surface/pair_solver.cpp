@@ -302,22 +302,6 @@ bool PairSolver::solve_in_order(const Job& job, Rule& rule, ContactRule name, co
   return true;
 }
 
-/// @param few  no more than pays where marching would meet the error, too
-bool PairSolver::samples(const Job& job, bool few, PairResult& out) {
-  // The spacing of the kept samples, or what they would have.
-  constexpr double kAcrossFeature = 3.0;
-  // Rays where this rule alone is asked for, and where it stands in for another; evaluations in which marching is done at a coarse error.
-  constexpr std::size_t kMostRays = 1u << 17, kRays = 1u << 15, kAsMarching = 300'000, kAny = std::numeric_limits<std::size_t>::max();
-  const ContactSettings& settings = job.settings();
-  PairPressure& pressure = job.polar.pressure;
-  const double first = job.polar.spacing > 0.0 ? job.polar.spacing : pressure.feature_size() / kAcrossFeature;
-  const SampleRuleSolver::Limits limits{settings.error, settings.max_refinement, settings.only == ContactRule::Samples ? kMostRays : kRays,
-                                        few ? kAsMarching : kAny};
-  return solve_in_order(job, samples_, ContactRule::Samples, [&](const Regions& regions, const Vec3& reference) {
-    return samples_.solve({pressure, third_bodies_, job.overlap, regions, reference, first, limits}, out.points);
-  }, out);
-}
-
 bool PairSolver::march(const Job& job, PairResult& out) {
   const ContactSettings& settings = job.settings();
   PairPressure& pressure = job.polar.pressure;
@@ -353,28 +337,13 @@ bool PairSolver::panels(const Job& job, PairResult& out) {
   }, out);
 }
 
-/// The rules that fit where polar rings do not, or are not as good as asked: the first whose bound is, else the least bound.
-/// @param have  `out` holds a result already   @return whether it holds one
-bool PairSolver::stand_in(const Job& job, bool have, PairResult& out) {
-  // Few samples meet a coarse error with fewer evaluations than marching begins with; finer ones they meet late or never.
-  constexpr double kCoarse = 1e-2, kFinestSampled = 1e-3;
-  const ContactSettings& settings = job.settings();
-  const auto set_aside = [&] {
-    std::swap(kept_, out);
-    out.summary.bodies = kept_.summary.bodies;
-  };
-  enum class Try { FewSamples, March, Samples };
-  for (const Try rule : {Try::FewSamples, Try::March, Try::Samples}) {
-    const bool marched = rule == Try::March, few = rule == Try::FewSamples;
-    if (few ? settings.only != ContactRule::None || settings.error < kCoarse
-            : settings.only != ContactRule::None && settings.only != (marched ? ContactRule::March : ContactRule::Samples)) continue;
-    if (have && (meets(out, settings.error) || (!marched && out.summary.error_estimate <= kFinestSampled))) continue;
-    if (have) set_aside();
-    const bool fits = marched ? march(job, out) : samples(job, few, out);
-    if (have && (!fits || kept_.summary.error_estimate <= out.summary.error_estimate)) set_aside();
-    have = have || fits;
-  }
-  return have;
+/// Marches where polar patches do not meet the error, and keeps the better of both. @return whether that is the marched one
+bool PairSolver::march_instead(const Job& job, PairResult& out) {
+  std::swap(kept_, out);
+  out.summary.bodies = kept_.summary.bodies;
+  if (march(job, out) && out.summary.error_estimate < kept_.summary.error_estimate) return true;
+  std::swap(kept_, out);
+  return false;
 }
 
 /// Whether polar patches would be many, or crossed by many kinks, so that panels cost less.
@@ -426,19 +395,14 @@ void PairSolver::choose(const Job& job, PairResult& out) {
       if (!fits && any) reason = RuleReason::ThirdBody;
     }
   }
-  if (!fits && only == ContactRule::Polar) {
-    begin_anew(job, out);
-    out.summary.error_estimate = 1.0;
-  } else if (!fits || (any && !patches_.empty() && !meets(out, job.settings().error))) {
-    const bool polar_fits = fits;
-    fits = stand_in(job, polar_fits, out);
-    if (polar_fits && out.summary.rule != ContactRule::Polar) reason = RuleReason::Unmet;
-    if (any && !polar_fits && out.summary.rule == ContactRule::March && job.a.skeleton == nullptr && job.b.skeleton == nullptr) reason = RuleReason::NoSkeleton;
+  if (!fits) {
+    fits = only != ContactRule::Polar && march(job, out);
     if (!fits) {
       begin_anew(job, out);
-      if (may_be_missed) out.summary.error_estimate = 1.0;
-      if (only == ContactRule::Samples && patches_.any_touches(job.polar.pressure, job.polar.extent, job.convex)) out.summary.error_estimate = 1.0;
+      if (only == ContactRule::Polar || may_be_missed) out.summary.error_estimate = 1.0;
     }
+  } else if (any && !patches_.empty() && !meets(out, job.settings().error) && march_instead(job, out)) {
+    reason = RuleReason::Unmet;
   }
   out.summary.reason = reason;
 }

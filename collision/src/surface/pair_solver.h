@@ -8,7 +8,6 @@
 
 #include "supple/collision/find_contacts.h"
 #include "surface/march/march_rule.h"
-#include "surface/march/sample_rule.h"
 #include "surface/pair_result.h"
 #include "surface/panels/panel_rule.h"
 #include "surface/polar/imprint.h"
@@ -68,10 +67,9 @@ class PairSolver {
   bool imprints_cut(const Job& job, PairResult& out);
   bool stars_cut(const Job& job, double asked, PairResult& out);
   bool polar_cut(const Job& job, PairResult& out);
-  bool samples(const Job& job, bool few, PairResult& out);
   bool march(const Job& job, PairResult& out);
   bool panels(const Job& job, PairResult& out);
-  bool stand_in(const Job& job, bool have, PairResult& out);
+  bool march_instead(const Job& job, PairResult& out);
   [[nodiscard]] bool suits_panels(const Job& job) const;
   void choose(const Job& job, PairResult& out);
   void take_all_thirds(const Job& job);
@@ -86,7 +84,6 @@ class PairSolver {
 
   PolarPatches patches_;
   ImprintFinder imprint_;
-  SampleRuleSolver samples_;
   MarchRuleSolver march_;
   PanelRoom panel_room_;
   PeakFinder finder_;

@@ -191,33 +191,6 @@ const KronrodRule& kronrod_rule(int gauss) {
   return gauss == 2 ? coarsest : gauss == 3 ? coarse : fine;
 }
 
-const KronrodRule& patterson_rule() {
-  static const KronrodRule rule = make_nested(
-      std::array{0.993831963212755022208512841307951, 0.960491268708020283423507092629080, 0.888459232872256998890420167258503,
-                 0.774596669241483377035853079956480, 0.621102946737226402940687443816595, 0.434243749346802558002071502844628,
-                 0.223386686428966881628203986843998, 0.0},
-      std::array{0.017001719629940260339027417402654, 0.051603282997079739696920120567861, 0.092927195315124537685894222654169,
-                 0.134415255243784220359968764802492, 0.171511909136391380787353165019717, 0.200628529376989021033931873331359,
-                 0.219156858401587496403693161643774, 0.225510499798206687386422549155950},
-      std::span(kronrod_rule(3).weight).first(4));
-  return rule;
-}
-
-const KronrodRule& patterson_additions() {
-  static const KronrodRule rule = [] {
-    const KronrodRule& whole = patterson_rule();
-    KronrodRule added;
-    for (std::size_t k = 0; k < whole.node.size(); k += 2) {
-      added.node.push_back(whole.node[k]);
-      added.weight.push_back(whole.weight[k]);
-    }
-    added.gauss_weight.resize(added.node.size());
-    added.highest.fill(added.gauss_weight);
-    return added;
-  }();
-  return rule;
-}
-
 const CurveAngles& curve_angles(std::size_t n) {
   static const std::vector<std::pair<std::size_t, CurveAngles>> all = [] {
     std::vector<std::pair<std::size_t, CurveAngles>> made{{1, make_curve_angles(polar_rays().front())}};

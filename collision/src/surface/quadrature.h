@@ -34,10 +34,6 @@ struct KronrodRule {
 };
 /// @param gauss  nodes of the smaller rule, in {2, 3, 7}; 2 gauss + 1 of the larger (Kronrod 1965; QUADPACK)
 [[nodiscard]] const KronrodRule& kronrod_rule(int gauss);
-/// The extension of the rule of 7 nodes that Kronrod's are, which are every second one of its 15 (Patterson 1968, Math. Comp. 22, 847); `gauss_weight` is theirs.
-[[nodiscard]] const KronrodRule& patterson_rule();
-/// Its nodes that the smaller rule lacks, with the weights that they have in it; nothing to compare with.
-[[nodiscard]] const KronrodRule& patterson_additions();
 
 /// The rules of the polar quadrature from coarse to fine (theory of spectral quadrature on a smooth patch).
 struct PolarRule {

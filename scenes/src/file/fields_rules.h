@@ -65,7 +65,7 @@ template <> struct EnumNames<SplitName> {
   static constexpr std::array<std::string_view, 2> names{"energy", "contribution"};
 };
 template <> struct EnumNames<RuleName> {
-  static constexpr std::array<std::string_view, 5> names{"auto", "samples", "polar", "march", "panels"};
+  static constexpr std::array<std::string_view, 4> names{"auto", "polar", "march", "panels"};
 };
 template <> struct EnumNames<CoreName> {
   static constexpr std::array<std::string_view, 2> names{"soft", "barrier"};

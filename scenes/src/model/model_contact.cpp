@@ -33,7 +33,6 @@ double lag(double x) {
 
 collision::ContactRule rule_of(RuleName name) {
   switch (name) {
-    case RuleName::Samples: return collision::ContactRule::Samples;
     case RuleName::Polar: return collision::ContactRule::Polar;
     case RuleName::March: return collision::ContactRule::March;
     case RuleName::Panels: return collision::ContactRule::Panels;

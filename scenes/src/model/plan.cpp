@@ -109,11 +109,11 @@ std::string meshing_of(const Scene& scene, const Model& model) {
   return text + (graph ? ", vertices on creases" : "") + touching;
 }
 
-/// Which rule samples the contact surface, and why.
+/// Which rule integrates over the contact surface, and why.
 std::string rule_of_contact(const Scene& scene) {
   const RuleName rule = scene.contact.rule;
   if (rule != RuleName::Auto) return std::string(name_of(rule)) + ": set in the scene";
-  return "auto: panels where the pressure has many maxima, polar where patches are star-shaped about their peak, else samples or march; relative error " + number_text(contact_error(scene));
+  return "auto: panels where the pressure has many maxima, polar where patches are star-shaped about their peak, else march; relative error " + number_text(contact_error(scene));
 }
 
 }  // namespace

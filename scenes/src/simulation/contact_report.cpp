@@ -39,7 +39,6 @@ ContactReport report_contacts(Simulation& simulation) {
 const char* rule_name(collision::ContactRule rule) {
   switch (rule) {
     case collision::ContactRule::Polar: return "polar";
-    case collision::ContactRule::Samples: return "samples";
     case collision::ContactRule::March: return "march";
     case collision::ContactRule::Panels: return "panels";
     case collision::ContactRule::None: break;

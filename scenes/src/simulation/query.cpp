@@ -44,7 +44,6 @@ std::string reason_text(collision::RuleReason reason) {
     case collision::RuleReason::Unmet: return "its error estimate is smaller than that of polar, which exceeds the given error";
     case collision::RuleReason::ManyHills: return "the pressure has many maxima, which panels cover all at once";
     case collision::RuleReason::Within: return "one body lies inside the other, whose pressure is nowhere smaller: energy, but no contact surface and no force";
-    case collision::RuleReason::NoSkeleton: return "polar does not fit, and there is no skeleton to trace rays from";
   }
   return "";
 }

@@ -421,7 +421,7 @@ void add_contact(std::vector<Option>& all) {
   const std::string rubs = "{modulus: 1000, friction: 0.5, dissipation: 0.1}";
   on_ground("contact.error", rubs, ground + "contact: {error: $}", "1e-2", "1e-6");
   on_ground("contact.split=contribution", rubs, ground + "contact: {split: $}", "energy", "contribution");
-  on_ground("contact.rule=samples", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "samples");
+  on_ground("contact.rule=panels", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "panels");
   on_ground("contact.rule=polar", rubs, ground + "contact: {error: 1e-2, rule: $}", "march", "polar");
   on_ground("contact.rule=march", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "march");
   on_ground("contact.rule=panels", rubs, ground + "contact: {error: 1e-2, rule: $}", "auto", "panels");

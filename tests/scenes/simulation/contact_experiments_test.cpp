@@ -261,7 +261,7 @@ TEST(ContactKeys, EachOfTheRulesHasItsOwnPointsAndTheSameForce) {
   Vec3 force = Vec3::Zero();
   std::vector<std::uint64_t> points;
   for (const auto& [name, rule, error] : {std::tuple{"auto", collision::ContactRule::Polar, 1e-3},
-                                          {"samples", collision::ContactRule::Samples, 5e-3},
+                                          {"panels", collision::ContactRule::Panels, 5e-3},
                                           {"march", collision::ContactRule::March, 2e-2}}) {
     Simulation simulation = make(dumbbell_on_ball("error: " + std::to_string(error) + ", rule: " + name));
     ASSERT_EQ(simulation.contacts().summary.size(), 1u);
@@ -406,7 +406,6 @@ void expect_held(const char* rule, double sideways) {
 }
 
 TEST(Ring, HoldsABallThatIsTooLargeForIt) {
-  expect_held("samples", 1e-12);
   expect_held("march", 1e-12);
 }
 

@@ -60,7 +60,7 @@ TEST(Explain, SaysWhyNoStepCanBeMade) {
 }
 
 TEST(Query, SaysWhereTheErrorIsAboveWhatWasAsked) {
-  // The patch of a ring on the ground: samples end at a bound of 8e-2, marching reaches the given error.
+  // The patch of a ring on the ground: polar rings do not fit, marching reaches the given error.
   const auto make = [](const std::string& rule) {
     return Simulation(parse_scene("schema: 1\nduration: 1 s\nground: {modulus: 1e6}\ncontact: {error: 1e-3, rule: " + rule +
                                       "}\nobjects:\n  - name: hoop\n    particles: {at: [0, 0, 0.085]}\n"
@@ -68,7 +68,7 @@ TEST(Query, SaysWhereTheErrorIsAboveWhatWasAsked) {
                                   "test.yaml", "."));
   };
   for (const bool met : {true, false}) {
-    Simulation simulation = make(met ? "march" : "samples");
+    Simulation simulation = make(met ? "march" : "polar");
     const auto pair = nlohmann::json::parse(query_contact(simulation, false)).at("pairs").at(0);
     EXPECT_EQ(pair.at("error_asked").get<double>(), 1e-3);
     EXPECT_EQ(pair.at("error_met").get<bool>(), met);

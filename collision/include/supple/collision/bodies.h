@@ -42,8 +42,7 @@ struct ContactBody {
   std::span<const Vec3> velocity;            ///< of the parts' centres [m/s], shape [parts]
   std::span<const Vec3> angular_velocity;    ///< of the parts, world axes [rad/s], shape [parts]
   const implicit::SurfaceSamples* samples = nullptr;  ///< null: the body offers no seeds (a half-space)
-  /// What the rule by samples sends its rays from, placed by `pose`; null: the body offers none.
-  const implicit::Skeleton* skeleton = nullptr;
+  const implicit::Skeleton* skeleton = nullptr;  ///< what its field comes from, placed by `pose`; null: an obstacle or another field
   std::span<const PartYield> yield;          ///< of the parts, shape [parts]; empty: the body does not give way
   bool fixed = false;                        ///< takes forces without moving; two fixed bodies do not touch
   double core_value = std::numeric_limits<double>::infinity();  ///< F where the body is deepest [1], or less; for hard cores

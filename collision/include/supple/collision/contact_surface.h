@@ -16,7 +16,6 @@ namespace supple::collision {
 enum class ContactRule : std::uint8_t {
   None,   ///< no overlap was found
   Polar,  ///< Gauss-Legendre in radius times trapezoid in angle about the point of largest pressure
-  Samples,  ///< where the seed rays of both bodies cross Sigma (Gascuel 1993), refined by denser seeds
   March,  ///< tetrahedra over the overlap box, Gauss points on curved triangles of Sigma, refined where they err most
   Panels,  ///< Gauss points on panels across parallel rays, cut at the rim, third bodies and kinks; halved where they err most
 };
@@ -27,8 +26,7 @@ enum class RuleReason : std::uint8_t {
   Fits,        ///< polar: every patch is seen whole from its peak
   NoGraph,     ///< not polar: a patch is no graph over a disc, or has no peak
   ThirdBody,   ///< not polar: a third body presses on a patch of bodies with several parts, or cuts it badly
-  NoSkeleton,  ///< neither polar nor samples: neither body has a skeleton
-  Unmet,       ///< not polar: it fits, but another rule has the smaller bound
+  Unmet,       ///< not polar: it fits, but marching has the smaller estimate
   ManyHills,   ///< panels: the pressure has more hills than it pays to look at one by one, or a wide patch lies on many primitives
   Within,      ///< no rule: one body lies in the other, which presses harder all over, or as hard: an energy without Sigma and force
 };
@@ -39,9 +37,9 @@ struct ContactSettings {
   double error = 1e-4;
   bool energy = true;    ///< false: energy, displaced volumes and squeezed regions only where the parts of a body need them
   int max_refinement = 6;  ///< refinements before the estimate is accepted as it is
-  /// None: panels where the pressure has many hills and they meet the error; else polar where it fits; else samples for coarse errors, marching for finer ones; and where a bound is not as good as asked, of
-  /// all the rules that fit the one with the smallest. Otherwise this rule alone. A pair that it does
-  /// not fit (no smooth patch; two bodies without skeletons) then has no force, and an error estimate of 1.
+  /// None: panels where the pressure has many hills and they meet the error; else polar where it fits; else marching, also where polar does not meet the
+  /// error and marching has the smaller estimate. Otherwise this rule alone. A pair that it does not fit (polar: a patch that is no graph over a disc) then
+  /// has no force, and an error estimate of 1.
   ContactRule only = ContactRule::None;
   /// Two balls, or a ball and a half-space, are the same all around one line: the polar rule then follows a single ray and
   /// turns it. Off: every ray is followed, for comparison.

@@ -117,6 +117,7 @@ bool PolarRuleSolver::kinks_cross(PairPressure& pressure) {
   if (kinks_.empty() && third_.empty()) return false;
   follow_rim();
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
+    if (!parts_at(kinks_[k])) continue;
     const bool side = kinks_[k].value(frame_.origin) > 0.0;
     const auto other = [&](const Vec3& x) { return (kinks_[k].value(x) > 0.0) != side; };
     if (std::any_of(fine_rim_.begin(), fine_rim_.end(), other) ||
@@ -418,7 +419,6 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
     if (!x.good) panels_[first + x.ray / per_panel].lost = true;
   }
   std::erase_if(crossings_, [](const Crossing& x) { return !x.good || x.radius >= 1.0; });
-  if (mild_) return;
   const auto same = [](const Crossing& x, const Crossing& y) { return x.kink == y.kink; };
   std::size_t next = 0;
   for (std::size_t p = first; p < panels_.size(); ++p) {

@@ -435,7 +435,6 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   if (cut_) follow_tangents();  // corners of third bodies are begun there
   about_middle_ = by_sectors_ = true;
   rise_.setZero();
-  mild_ = false;
   const double error = settings.error;
   const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_, third = fine && error >= 1e-6 && !cut_;
   for (;;) {

@@ -327,7 +327,6 @@ bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const K
   error_ = job.settings.error;
   third_ = third;
   imprints_.clear();
-  uneven_ = false;
   peak_ = frame.origin;
   may_go_through_ = false;
   for (const int side : {0, 1}) {
@@ -349,7 +348,6 @@ bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const K
   if (peaked && !follow && solve_about_peak(job, frame, {.round = round, .star = true}, points)) return true;
   if (job.faces && anew() && solve_about_middle(job, frame, points)) return true;
   if (peaked && anew() && solve_about_star(job, frame, follow, points)) return true;
-  if (uneven_ && anew() && solve_about_peak(job, frame, {.round = round}, points)) return true;
   if (peaked && !follow && anew() && solve_about_peak(job, frame, {.round = round, .any = true}, points)) return true;
   points.back_to(before);
   return false;
@@ -363,7 +361,7 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
   bool round = how.round;
   const double error = settings.error;
   cut_ = false;
-  about_middle_ = by_sectors_ = mild_ = false;
+  about_middle_ = by_sectors_ = false;
   rise_.setZero();
   spread_ = widest_ = {};
   frame_ = frame;
@@ -379,7 +377,6 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
     if (smooth) return std::min<std::size_t>(error < 1e-7 ? 2 : error < 1e-3 ? 1 : 0, last - 1);
     return std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
   };
-  bool parted = any && third_.empty();
   parted_ = 0;
   polygon_.clear();
   kinks_.clear();
@@ -414,14 +411,7 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
       thickness_ = frame.thickness;
       return true;
     }
-    if (!parted && parts && kinks_cross(pressure)) {
-      parted = true;
-      if (star && error >= kLeastMild && only_mild_kinks()) {
-        const bool fits = solve_mild(pressure, error) && finish(pressure, column_of(error), regions, error, nullptr, points);
-        about_star_ = false;
-        uneven_ = !fits;
-        return fits;
-      }
+    if (parts && !(any && third_.empty()) && kinks_cross(pressure)) {
       if (solve_split(pressure, settings)) {
         parted_ = static_cast<std::uint32_t>(crossing_.size());
         return finish(pressure, column_of(error), regions, error, nullptr, points);

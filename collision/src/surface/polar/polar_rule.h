@@ -1,9 +1,9 @@
 /// @file polar_rule.h
 /// Spectral quadrature on a smooth patch of Sigma: Gauss-Legendre in the radius times the trapezoid rule in the angle
 /// about the point of largest pressure, both exponentially convergent because the integrand is smooth, periodic and
-/// vanishes at the rim. Where mild kinks of a field cross the patch, the same rules about its middle converge with the fourth
-/// power of their points; where others do, radii are parted at them, and angles where kinks meet the rim and as finely as the
-/// error asks. Where faces lie on faces the pressure has no peak that says anything: there the patch is parted
+/// vanishes at the rim. Where kinks of a field cross the patch, radii are parted at them, and angles where kinks meet the rim and as finely as the
+/// error asks; kinks in a third derivative part nothing at errors of 1e-4 and more, where the same rules converge with the fourth power of their
+/// points. Where faces lie on faces the pressure has no peak that says anything: there the patch is parted
 /// about its middle. Columns along the axis carry the integrals over the squeezed regions.
 #pragma once
 
@@ -26,11 +26,6 @@ namespace supple::collision {
 
 /// The finest rule whose error is judged from the ends of its rays.
 inline constexpr std::size_t kFinestJudged = 3;
-
-/// Errors asked for down to which mild kinks may be left alone; finer ones are reached by parting.
-inline constexpr double kLeastMild = 1e-6;
-/// Errors below which rays are parted at mild kinks, though angles are not.
-inline constexpr double kMildPartedBelow = 5e-5;
 
 /// Over the error asked for times the pressure at the peak: pressures of third bodies at the rim that say nothing, as rims are off by more.
 inline constexpr double kAtRim = 0.1;
@@ -73,7 +68,6 @@ class PolarRuleSolver {
   [[nodiscard]] bool same_side(const Vec3& from, const Vec3& to) const;
   [[nodiscard]] double rim_moved() const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
-  void start_outline(const PolarRule& rule);
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
   bool integrate();
@@ -104,13 +98,6 @@ class PolarRuleSolver {
   [[nodiscard]] bool clear_of_kinks(PairPressure& pressure);
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
 
-  // Patches that mild kinks cross: mild_rule.cpp.
-  [[nodiscard]] bool only_mild_kinks() const;
-  bool solve_mild(PairPressure& pressure, double error);
-  bool refine_rings(PairPressure& pressure, double error);
-  bool solve_mild_sectors(PairPressure& pressure, const ContactSettings& settings);
-  [[nodiscard]] double half_the_rays(std::size_t radial) const;
-
   // Patches that kinks cross: split_rule.cpp; crossings of rays: cross_kinks.cpp.
   /// Gauss points through a squeezed region.
   static int column_of(double error) { return error >= 1e-4 ? 3 : error >= 1e-6 ? 4 : error >= 1e-8 ? 5 : 6; }
@@ -125,8 +112,6 @@ class PolarRuleSolver {
     int nodes = 0;                    // on a ray that no kink crosses
     std::size_t rays = 0;             // of `fine`
     std::size_t change = 0, change_end = 0;  // of `changes_`
-    std::size_t along = 0;            // its first ray of `along_`, where kinks are mild
-    bool extend = false;              // rays between its own are due
     bool halved = false;              // or a part of one
     bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
     bool lost = false;                // a crossing that seemed to be there was not found
@@ -155,11 +140,6 @@ class PolarRuleSolver {
     double place = 0.0;
     std::optional<Touch> touch;    // a kink that rays meet twice before it, or after it, and then not at all
   };
-  /// What one ray adds to the sums of its panel, and its nodes.
-  struct RaySums {
-    PatchSums sums;
-    std::size_t first = 0, last = 0;  // of `kept_`
-  };
   struct Corner {
     Vec3 at;                       // on the rim
     std::size_t kink;              // that meets it
@@ -174,6 +154,12 @@ class PolarRuleSolver {
   bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
   bool kinks_cross(PairPressure& pressure);
+  /// Whether a patch is parted at a kink. The fourth power of a rule's points, by which it converges across a jump of a third derivative, is enough to here.
+  [[nodiscard]] bool parts_at(const implicit::Kink& kink) const {
+    constexpr int kThirdDerivative = 3;
+    constexpr double kAcrossIt = 1e-4;  // error
+    return kink.order < kThirdDerivative || error_ < kAcrossIt;
+  }
   [[nodiscard]] double at_rim() const { return kAtRim * error_ * frame_.peak; }
   [[nodiscard]] bool taken_by_thirds();
   bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);
@@ -194,13 +180,10 @@ class PolarRuleSolver {
   bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
-  bool extend_panels(PairPressure& pressure, double error);
-  void merge(Panel& panel, const Panel& added);
   [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
   static double slow_decay(const Panel& panel, const PatchSums& all);
-  void doubt(Panel& panel, const PatchSums& all, double error) const;
+  void doubt(Panel& panel, const PatchSums& all) const;
   [[nodiscard]] bool grows_as_root(const Panel& panel) const;
-  [[nodiscard]] double largest_to_leave(double most) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
   // Corners of the rim: rim_corners.cpp.
@@ -360,7 +343,6 @@ class PolarRuleSolver {
   std::vector<implicit::Kink> near_kinks_;
   std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
   std::vector<Panel> panels_;
-  std::vector<RaySums> along_;
   struct Wave {
     Eigen::ArrayXd cosine, sine;
   };
@@ -373,8 +355,6 @@ class PolarRuleSolver {
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
   bool about_middle_ = false, about_star_ = false;
   bool by_sectors_ = false;              // rays go through `sectors_`
-  bool mild_ = false;                    // kinks that cross part no angles
-  bool uneven_ = false;                  // mild kinks cross, but the outline takes more rings than it is worth
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis; 0 elsewhere
   std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;

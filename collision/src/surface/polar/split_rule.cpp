@@ -16,12 +16,13 @@ namespace {
 
 constexpr double kWidest = 2.2;          // panel at the beginning [rad]
 constexpr double kWidestCoarse = 2.4;
+constexpr double kWidestOfStar = 0.8;    // where no kink parts the patch: its outline is uneven
 constexpr int kMostRadial = 16;
 constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
-constexpr std::size_t kMostPanels = 48, kMostMild = 128, kMostBesideThirds = 192;  // that the estimate may ask for
+constexpr std::size_t kMostPanels = 48, kMostBesideThirds = 192;  // that the estimate may ask for
 constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr double kSameTurn = 1e-7;       // [rad]
 constexpr double kSliversBelow = 1e-6;   // errors at which those between a corner of the rim and the first ray after it matter
@@ -34,11 +35,6 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 int nodes_on(int radial, double share) {
   const int least = share < kShort ? 2 : 3;
   return std::clamp(static_cast<int>(std::ceil(radial * (0.35 + 0.65 * share))), least, kMostRadial);
-}
-
-/// The same between mild kinks, which are many and leave little on a piece.
-int nodes_between_mild(int radial, double share) {
-  return std::clamp(static_cast<int>(std::ceil(radial * (0.2 + 0.8 * share))), 2, kMostRadial);
 }
 
 /// Points that are compared with n: one more, so that what they differ by is what n are off by.
@@ -77,9 +73,6 @@ constexpr double kDecayOnFaces = 2.0;    // of panels whose rays meet other kink
 constexpr double kOnFaces = 0.05, kOnFacesUneven = 0.1, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
 constexpr double kRadial = 2.0, kRadialOnFacesFew = 0.15, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
-/// Of either, where mild kinks are left alone and rules converge with the fourth power of their points.
-constexpr double kMildAngle = 0.15, kMildByChance = 0.3, kMildRadius = 2.0;
-constexpr double kExtended = 100.0;  // over what it may be: a panel's doubt that twice as many rays are worth their while for; beyond it is halved
 constexpr std::size_t kFine = 15;  // rays
 constexpr int kFewOnFaces = 3;     // points on a ray, which are compared with two
 
@@ -175,7 +168,6 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
         if (c < next && (right - left < shortest || 1.0 - right < shortest)) continue;
         // On faces it is the short last piece on which the pressure falls.
         const int all = about_middle_ ? panel.nodes
-                        : mild_       ? nodes_between_mild(panel.nodes, right - left)
                                       : nodes_on(panel.nodes, share_of(i, c - crossing_begin, right - left));
         const GaussRule& gauss = gauss_rule(!check ? all : about_middle_ ? check_on_faces(all) : check_of(all));
         for (std::size_t j = 0; j < gauss.node.size(); ++j) {
@@ -244,7 +236,6 @@ double PolarRuleSolver::rim_error(std::size_t ray, double rate) const {
 void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray) {
   panel.fine = panel.angular = panel.radial = {};
   panel.highest = {};
-  panel.along = along_.size();
   const std::size_t highest = rule.node.size() >= kFine ? panel.highest.size() : panel.highest.size() - 2;
   panel.first = kept_.point.size();
   double rim = 0.0, whole = 0.0, rate = 0.0;
@@ -259,7 +250,6 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
       weigh(along, x, normal_[i], area_[i], pressure_[i]);
     }
     panel.angular.add(along, rule.gauss_weight[k] / rule.weight[k]);
-    if (mild_) along_.push_back({along, kept_.point.size(), kept_.point.size() + ray_check_[ray + k] - ray_nodes_[ray + k]});
     for (std::size_t d = 0; d < highest; ++d) panel.highest[d].add(along, rule.highest[d][k]);
     const double area = rule.weight[k] * turn_[ray + k] * rays_.radius[ray + k] * rays_.radius[ray + k];
     rim += area * rim_error(ray + k, rate);
@@ -275,69 +265,6 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
   panel.by_rim = rim / whole;
   panel.rays = rule.node.size();
   panel.last = kept_.point.size();
-}
-
-/// Gives the panels that are due the rays of Patterson's rule between those of Kronrod's, which they keep.
-bool PolarRuleSolver::extend_panels(PairPressure& pressure, double error) {
-  const std::size_t count = panels_.size();
-  std::vector<std::size_t> due;
-  for (std::size_t p = 0; p < count; ++p) {
-    if (!panels_[p].extend) continue;
-    due.push_back(p);
-    Panel added;
-    added.begin = panels_[p].begin;
-    added.end = panels_[p].end;
-    added.nodes = panels_[p].nodes;
-    panels_.push_back(added);
-  }
-  if (due.empty()) return true;
-  const KronrodRule& rule = patterson_additions();
-  if (!find_rays(pressure, rule, error, count) || !solve_panels(pressure, rule, error, count)) return false;
-  for (std::size_t k = 0; k < due.size(); ++k) merge(panels_[due[k]], panels_[count + k]);
-  panels_.resize(count);
-  return true;
-}
-
-/// A panel of 7 rays and the 8 between them become one of 15; what radii are off by has been told by the former.
-void PolarRuleSolver::merge(Panel& panel, const Panel& added) {
-  const KronrodRule &old = kronrod_rule(3), &rule = patterson_rule();
-  Panel merged = panel;
-  merged.angular = panel.fine;
-  merged.radial.add(panel.angular, -1.0);
-  merged.radial.add(panel.fine);
-  merged.fine = {};
-  merged.highest = {};
-  merged.first = kept_.point.size();
-  merged.rim = kept_rim_.size();
-  merged.along = along_.size();
-  for (std::size_t k = 0; k < rule.node.size(); ++k) {
-    const bool kept = k % 2 == 1;
-    const Panel& from = kept ? panel : added;
-    const RaySums ray = along_[from.along + k / 2];
-    const double share = kept ? rule.weight[k] / old.weight[k / 2] : 1.0;
-    PatchSums along;
-    along.add(ray.sums, share);
-    merged.fine.add(along);
-    for (std::size_t d = 0; d < merged.highest.size(); ++d) merged.highest[d].add(along, rule.highest[d][k]);
-    const std::size_t begin = kept_.point.size();
-    for_columns([&](auto& all, const auto&) {
-      all.resize(begin + ray.last - ray.first);
-      std::copy(all.begin() + static_cast<std::ptrdiff_t>(ray.first), all.begin() + static_cast<std::ptrdiff_t>(ray.last),
-                all.begin() + static_cast<std::ptrdiff_t>(begin));
-    });
-    for (std::size_t i = begin; i < kept_.point.size(); ++i) {
-      kept_weight_[i] *= share;
-      kept_area_[i] *= share;
-    }
-    along_.push_back({along, begin, kept_.point.size()});
-    kept_rim_.push_back(RimPoint(kept_rim_[from.rim + k / 2]));
-  }
-  merged.by_rim = std::max(panel.by_rim, added.by_rim);
-  merged.rays = rule.node.size();
-  merged.last = kept_.point.size();
-  merged.rim_end = kept_rim_.size();
-  merged.extend = false;
-  panel = merged;
 }
 
 /// What the coefficients of the highest degrees say that a panel's sums are off by, over those of `all`: nothing to speak of where they fall
@@ -356,17 +283,10 @@ double PolarRuleSolver::slow_decay(const Panel& panel, const PatchSums& all) {
 }
 
 /// What the sums of a panel are off by at most, over those of `all`.
-void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all, double error) const {
+void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   const bool fine = panel.rays >= kFine;
   panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
   panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
-  if (mild_) {
-    // Rules agree by chance at any size, but it harms only where they differ by about what is asked for.
-    const double share = error < kMildPartedBelow ? std::clamp(kMildByChance * panel.by_angle / error, kMildAngle, 1.0) : kMildAngle;
-    panel.by_angle = std::max(share * panel.by_angle, slow_decay(panel, all));
-    panel.by_radius *= kMildRadius;
-    return;
-  }
   if (about_middle_ && cut_) {
     const double share = kBesideThirds * (panel.halved ? kHalf : 1.0);
     panel.by_angle *= share;
@@ -418,8 +338,8 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   const bool fine = error < 1e-4;
   const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
   const int radial = error >= 1e-3 ? 3 : !fine ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 10;
-  const double widest = fine ? kWidest : kWidestCoarse;
-  about_middle_ = by_sectors_ = mild_ = false;
+  const double widest = about_star_ && crossing_.empty() ? kWidestOfStar : fine ? kWidest : kWidestCoarse;
+  about_middle_ = by_sectors_ = false;
   for (;;) {
     std::vector<Corner> corners;
     find_corners(pressure, 0, corners);
@@ -485,7 +405,7 @@ bool PolarRuleSolver::add_missed_kinks() {
   fine_rim_.clear();
   for (const RimPoint& p : kept_rim_) fine_rim_.push_back(frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis);
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
-    if (std::find(crossing_.begin(), crossing_.end(), k) != crossing_.end()) continue;
+    if (!parts_at(kinks_[k]) || std::find(crossing_.begin(), crossing_.end(), k) != crossing_.end()) continue;
     for (std::size_t i = 0; i < sides.size(); ++i) sides[i] = kinks_[k].value(fine_rim_[i]);
     places.clear();
     follow_signs(sides, places);
@@ -504,20 +424,6 @@ bool PolarRuleSolver::grows_as_root(const Panel& panel) const {
   return (sector.strip_begin && !panel.touch_begin && panel.begin == whole) || (sector.strip_end && !panel.touch_end && panel.end == whole + 1.0);
 }
 
-/// What a panel may be off by in angle or radius so that all those which are not off by more are so by `most` together.
-double PolarRuleSolver::largest_to_leave(double most) const {
-  std::vector<double> off;
-  for (const Panel& panel : panels_) off.insert(off.end(), {panel.by_angle, panel.by_radius});
-  std::sort(off.begin(), off.end());
-  double sum = 0.0, largest = 0.0;
-  for (const double x : off) {
-    sum += x;
-    if (sum > most) break;
-    largest = x;
-  }
-  return largest;
-}
-
 /// Halves panels until the estimate is low enough; then nodes and sums of all are in place, unless `crossing_` grew.
 /// @param larger  rule that panels get before they are halved, or null
 /// @param look  whether kinks that cross the rim of all rays are added
@@ -531,28 +437,26 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   kept_pressure_.clear();
   kept_normal_.clear();
   kept_rim_.clear();
-  along_.clear();
   changes_.clear();
   residual_ = lift_ = below_ = rim_error_ = 0.0;
   spread_ = widest_ = {};
   std::size_t begin = 0, solved = panels_.size();
   PatchSums all;
   const bool beside = about_middle_ && cut_;
-  const std::size_t most = beside ? kMostBesideThirds : mild_ ? kMostMild : kMostPanels;
+  const std::size_t most = beside ? kMostBesideThirds : kMostPanels;
   for (;;) {
     if (begin < panels_.size()) {
       if (!find_rays(pressure, *rule, error, begin)) return false;
       if (begin == 0 && look && add_missed_kinks()) return true;
       if (!solve_panels(pressure, *rule, error, begin)) return false;
     }
-    if (!extend_panels(pressure, error)) return false;
     all = {};
     for (const Panel& panel : panels_) all.add(panel.fine);
     if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
     estimate_ = below_ / all.load;
     rim_error_ = 0.0;
     for (Panel& panel : panels_) {
-      doubt(panel, all, error);
+      doubt(panel, all);
       estimate_ += panel.by_angle + panel.by_radius;
       rim_error_ += panel.by_rim * panel.fine.area / all.area;
     }
@@ -562,19 +466,13 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
     if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= most) break;
     // New ones go to the end; the angles are put in order when all is done.
     const auto count = static_cast<double>(panels_.size());
-    const double share = mild_ ? largest_to_leave(0.75 * error) : 0.5 * error / count;
+    const double share = 0.5 * error / count;
     std::vector<Panel> finer;
     bool by_angle = false;
-    std::size_t extended = 0;
     std::erase_if(panels_, [&](Panel& panel) {
       const bool more = !enough && panel.by_radius > share && panel.nodes < kMostRadial;
       const bool part = (!enough && panel.by_angle > share) || unseen(panel);
       if (!more && !part) return false;
-      if (mild_ && !more && panel.rays < kFine && panel.by_angle <= kExtended * share) {
-        panel.extend = true;
-        ++extended;
-        return false;
-      }
       Panel next;
       next.nodes = more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
       next.begin = panel.begin;
@@ -588,7 +486,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       };
       next.touch_begin = panel.touch_begin;
       next.halved = panel.halved || (part && (larger == nullptr || unseen(panel)));
-      if (part && panel.change < panel.change_end && !beside && !mild_) {
+      if (part && panel.change < panel.change_end && !beside) {
         for (std::size_t c = panel.change; c < panel.change_end; ++c) {
           const std::optional<double> touch = changes_[c].touch ? touching_angle(pressure, *changes_[c].touch) : std::nullopt;
           end_at(touch.value_or(changes_[c].place), touch.has_value());
@@ -603,10 +501,10 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       finer.push_back(next);
       return true;
     });
-    if (finer.empty() && extended == 0) break;
+    if (finer.empty()) break;
     if (larger != nullptr && by_angle) rule = std::exchange(larger, nullptr);
     begin = panels_.size();
-    solved += finer.size() + extended;
+    solved += finer.size();
     panels_.insert(panels_.end(), finer.begin(), finer.end());
   }
   std::sort(panels_.begin(), panels_.end(), [](const Panel& a, const Panel& b) { return a.begin < b.begin; });

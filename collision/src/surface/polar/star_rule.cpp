@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "supple/core/math.h"
 #include "surface/polar/polar_rule.h"
@@ -250,6 +249,7 @@ void PolarRuleSolver::find_star_kinks(PairPressure& pressure) {
 void PolarRuleSolver::cross_star(PairPressure& pressure) {
   crossing_.clear();
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
+    if (!parts_at(kinks_[k])) continue;
     const bool side = kinks_[k].value(frame_.origin) > 0.0;
     const auto other = [&](const RimPoint& p) {
       const Vec3 reach = direction(p.at.x(), p.at.y());
@@ -290,16 +290,11 @@ bool PolarRuleSolver::solve_about_star(const PolarJob& job, const PeakFrame& fra
   about_star_ = follow_rim_curve(pressure, fine) && move_to_star(pressure);
   if (!about_star_) return false;
   find_star_kinks(pressure);
-  crossing_.resize(kinks_.size());
-  std::iota(crossing_.begin(), crossing_.end(), std::size_t{0});
-  const bool any = settings.error >= kMildPartedBelow && only_mild_kinks();  // which of them cross is not asked: they part nothing
-  if (!any) cross_star(pressure);
-  const bool mild = settings.error >= kLeastMild && only_mild_kinks() && solve_mild_sectors(pressure, settings);
-  if (any && !mild) cross_star(pressure);
-  const bool fits = mild || solve_split(pressure, settings);
+  cross_star(pressure);
+  const bool fits = solve_split(pressure, settings);
   about_star_ = false;
   if (!fits) return false;
-  parted_ = mild ? 0 : static_cast<std::uint32_t>(crossing_.size());
+  parted_ = static_cast<std::uint32_t>(crossing_.size());
   polygon_ = outline_;
   return finish(pressure, column_of(settings.error), job.regions, settings.error, nullptr, points);
 }

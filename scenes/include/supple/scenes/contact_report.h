@@ -38,7 +38,7 @@ struct ContactReport {
 };
 [[nodiscard]] ContactReport report_contacts(Simulation& simulation);
 
-/// Name of a rule as the key `contact.rule` has it: "polar", "samples", "march" or "panels"; "none" without contact.
+/// Name of a rule as the key `contact.rule` has it: "polar", "march" or "panels"; "none" without contact.
 [[nodiscard]] const char* rule_name(collision::ContactRule rule);
 
 }  // namespace supple::scenes

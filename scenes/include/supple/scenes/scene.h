@@ -332,7 +332,7 @@ struct WindDesc {
 };
 
 enum class SplitName : std::uint8_t { Energy, Contribution };
-enum class RuleName : std::uint8_t { Auto, Samples, Polar, March, Panels };
+enum class RuleName : std::uint8_t { Auto, Polar, March, Panels };
 enum class CoreName : std::uint8_t { Soft, Barrier };
 
 /// contact.stick: friction by springs
