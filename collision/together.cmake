@@ -6,6 +6,6 @@ supple_together(
   "src/surface/polar/imprint.cpp src/surface/pair_solver.cpp src/surface/quadrature.cpp"
   "src/surface/march/march_kinks.cpp src/surface/march/march_pieces.cpp src/surface/polar/polar_patches.cpp"
   "src/surface/march/march_rule.cpp src/response/react.cpp"
-  "src/surface/polar/middle_rule.cpp src/pairs/sleep.cpp src/surface/polar/smooth_bound.cpp src/surface/polar/touch_kinks.cpp"
+  "src/surface/polar/middle_rule.cpp src/pairs/sleep.cpp src/surface/polar/smooth_estimate.cpp src/surface/polar/touch_kinks.cpp"
   "src/surface/region/polar_columns.cpp src/surface/polar/rim_corners.cpp src/surface/region/squeezed_region.cpp"
   "src/surface/polar/polar_rule.cpp src/response/stick.cpp src/surface/third_bodies.cpp")

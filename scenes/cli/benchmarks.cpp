@@ -32,6 +32,7 @@ constexpr std::array<Group, 15> kGroups{{
     {"implicit/mesh", "mesh_bench", "surface meshes and their errors (w1/64 to w4/512)", true},
     {"collision", "contact_bench", "one contact query: time, points and error; with a file name: also the plot of collision/rules"},
     {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; arguments: number of poses, case"},
+    {"collision/calibration", "contact_calibration", "share of random poses whose true error exceeds the estimate; arguments: number of poses, case, seed"},
     {"collision/invariance", "contact_invariance", "differences between swapped, rotated and scaled queries; arguments: number of poses, case"},
     {"collision/thin", "contact_thin", "contact queries of bodies that barely overlap; arguments: number of poses, seed"},
     {"collision/rules", "contact_rules", "time against error of the rules of the contact surface; with a file name: plot (SVG)"},

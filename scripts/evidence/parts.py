@@ -51,7 +51,7 @@ def queries(b):
         if row["error"] > float(asked):
             b.loss(f'`{row["name"]}` has a true error of {row["error"]:.1e} in its worst pose, above the one given.')
     slow = max(rows, key=lambda row: row["cpu_us_max"] / max(row["cpu_us_median"], 1e-9))
-    b.loss(f'The worst pose of `{slow["name"]}` takes {slow["cpu_us_max"] / slow["cpu_us_median"]:.0f} times the median: its patch is crossed by kinks or rims, where it is cut into pieces until the error bound holds.')
+    b.loss(f'The worst pose of `{slow["name"]}` takes {slow["cpu_us_max"] / slow["cpu_us_median"]:.0f} times the median: its patch is crossed by kinks or rims, where it is cut into pieces until the error estimate is low enough.')
     return b.command_lines() + ["Contact queries in random poses, with the reactions of stage 7 beside them. Errors are true ones, against closed forms or a finer rule with the bodies swapped.", ""] + table(
         ["case", "given error", "poses", "CPU time, median / largest [us]", "reactions, median [us]", "true error, median / largest"], cells)
 

@@ -4,7 +4,7 @@
 /// is the least of three rounds over all poses. The time of distributing the forces to the parts of the bodies is given too.
 /// Spheres of linear pressure have closed forms: the isobar at pressure p is a circle. The
 /// other cases are compared with the finest rule for the same bodies in another frame, which has other nodes; the error of that
-/// reference is added to the bounds. Poses whose patch is crossed by a kink of a field are listed separately.
+/// reference is added to the estimates. Poses whose patch is crossed by a kink of a field are listed separately.
 ///   contact_poses [POSES] [CASE|all] [auto|polar|march|panels] [SEED] [--all-rays] [--marched] [--depths LEAST LARGEST]
 /// --marched: where there is no closed form the reference is the rule march, which has neither rays nor panels.
 /// --all-rays: bodies of revolution get all rays, as other bodies do, instead of a single one.
@@ -80,8 +80,8 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
   constexpr std::array<double, 4> kErrors{1e-2, 1e-3, 1e-6, 1e-10};
   constexpr int kRepeats = 10, kRounds = 3;
   struct Line {
-    std::vector<double> cpu, forces, error, ratio;  // ratio: bound over error, where the reference can tell
-    int missed = 0, march = 0, unmet = 0, bound_broken = 0;
+    std::vector<double> cpu, forces, error, ratio;  // ratio: estimate over error, where the reference can tell
+    int missed = 0, march = 0, unmet = 0, exceeded = 0;
   };
   std::array<std::array<Line, kErrors.size()>, 2> classes;  // smooth, crossed by kinks
   struct Timed {
@@ -121,7 +121,7 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
       line.march += s->rule == collision::ContactRule::March ? 1 : 0;
       line.unmet += s->error_estimate > kErrors[k] ? 1 : 0;
       if (error > 10.0 * floor) line.ratio.push_back(s->error_estimate / error);
-      line.bound_broken += error > s->error_estimate + floor ? 1 : 0;
+      line.exceeded += error > s->error_estimate + floor ? 1 : 0;
     }
   }
   // What slows the machine down for a while would be the worst of a thousand poses: short queries are timed again when it is over.
@@ -151,10 +151,10 @@ void measure(std::string_view name, int poses, const MakePose& make_pose) {
     if (n == 0) continue;
     std::printf("{\"name\": \"collision/poses/%s%s/error=%g\", \"poses\": %zu, \"cpu_us_median\": %.1f, \"cpu_us_max\": %.1f, \"forces_us_median\": %.1f, "
                 "\"error\": %.2g, \"error_median\": %.2g, \"error_kind\": \"%s\", \"marched\": %d, \"missed\": %d, "
-                "\"estimates_over\": %d, \"bounds_broken\": %d, \"bound_over_error\": %.3g, \"least_bound_over_error\": %.3g, \"hash\": \"%s\"}\n",
+                "\"estimates_over\": %d, \"estimates_exceeded\": %d, \"estimate_over_error\": %.3g, \"least_estimate_over_error\": %.3g, \"hash\": \"%s\"}\n",
                 std::string(name).c_str(), i % 2 == 0 ? "" : "/kinks", kErrors[k], n, line.cpu[n / 2], line.cpu.back(), line.forces[n / 2],
                 line.error.back(), line.error[n / 2], "largest of force, area, centre", line.march, line.missed,
-                line.unmet, line.bound_broken, r == 0 ? 0.0 : line.ratio[r / 2], r == 0 ? 0.0 : line.ratio.front(), to_hex(hasher.value()).c_str());
+                line.unmet, line.exceeded, r == 0 ? 0.0 : line.ratio[r / 2], r == 0 ? 0.0 : line.ratio.front(), to_hex(hasher.value()).c_str());
   }
   std::fflush(stdout);
 }

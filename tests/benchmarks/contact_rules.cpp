@@ -77,7 +77,7 @@ class Panel {
 struct Asked {
   Answer answer;
   bool found = false;
-  double error_bound = 1.0, points = 0.0, cpu_us = std::numeric_limits<double>::infinity();
+  double error_estimate = 1.0, points = 0.0, cpu_us = std::numeric_limits<double>::infinity();
 };
 
 Asked ask(std::span<const collision::ContactBody> bodies, const collision::ContactSettings& settings,
@@ -96,7 +96,7 @@ Asked ask(std::span<const collision::ContactBody> bodies, const collision::Conta
   const auto& s = surface.summary[0];
   asked.found = true;
   asked.answer = {s.force.norm(), s.area, s.centre_of_pressure};
-  asked.error_bound = s.error_estimate;
+  asked.error_estimate = s.error_estimate;
   asked.points = static_cast<double>(s.points);
   if (summary != nullptr) *summary = s;
   return asked;
@@ -158,7 +158,7 @@ void measure_rings() {
     const double force = ask(bodies, {.error = 1e-9, .only = ContactRule::March}).answer.force;
     for (const int digits : {2, 3, 5, 8}) {
       const Asked asked = ask(bodies, {.error = std::pow(10.0, -digits), .only = ContactRule::March});
-      std::printf("| %s | 1e-%d | %.1e | %.1e | %.0f | %.3g |\n", name, digits, asked.error_bound, std::abs(asked.answer.force / force - 1.0), asked.points, asked.cpu_us);
+      std::printf("| %s | 1e-%d | %.1e | %.1e | %.0f | %.3g |\n", name, digits, asked.error_estimate, std::abs(asked.answer.force / force - 1.0), asked.points, asked.cpu_us);
     }
   };
   add("on the ground", {ring.body(), ground});

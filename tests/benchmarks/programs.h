@@ -6,6 +6,7 @@ namespace supple::benchmarks::programs {
 
 int contact_bench(int argc, char** argv);
 int contact_bodies(int argc, char** argv);
+int contact_calibration(int argc, char** argv);
 int contact_conservation(int argc, char** argv);
 int contact_invariance(int argc, char** argv);
 int contact_pile(int argc, char** argv);

@@ -112,7 +112,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
                          {"largest_pressure_pa", s.largest_pressure},
                          {"largest_overlap_m", s.largest_overlap},
                          {"residual", s.residual},
-                         {"error_bound", s.error_estimate},
+                         {"error_estimate", s.error_estimate},
                          {"error_asked", given_error},
                          {"error_met", !misses_error(s, given_error)},
                          {"patches", s.patches},

@@ -72,7 +72,7 @@ TEST(Query, SaysWhereTheErrorIsAboveWhatWasAsked) {
     const auto pair = nlohmann::json::parse(query_contact(simulation, false)).at("pairs").at(0);
     EXPECT_EQ(pair.at("error_asked").get<double>(), 1e-3);
     EXPECT_EQ(pair.at("error_met").get<bool>(), met);
-    EXPECT_EQ(pair.at("error_bound").get<double>() > 1.01e-3, !met) << pair;
+    EXPECT_EQ(pair.at("error_estimate").get<double>() > 1.01e-3, !met) << pair;
     const std::string text = explain(simulation);
     EXPECT_EQ(text.find(", above the given 0.001") == std::string::npos, met) << text;
   }

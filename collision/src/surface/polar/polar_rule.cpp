@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kLeastCosine = 0.2;     // of Sigma's normal to the axis
 constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
-constexpr double kOfLast = 0.3;          // of the bound of the rule before: the next may agree with it by chance
+constexpr double kOfLast = 0.3;          // of the estimate of the rule before: the next may agree with it by chance
 constexpr double kOfLastWhereSmooth = 1e-3;
 // What a kink near the rim can do between the nodes of the two coarsest rules of a pair of them.
 constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
@@ -27,7 +27,7 @@ constexpr double kNearRimOfFace = 1.0;   // beside whose edges the slope grows f
 constexpr double kBelowRim = 0.05;       // over the peak
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
-constexpr double kLeastOfBound = 0.25, kLeastOfFinest = 0.01;  // of what the ends of rays say: errors of deep balls are a seventh and less
+constexpr double kLeastOfEnds = 0.25, kLeastOfFinest = 0.01;  // of what the ends of rays say: errors of deep balls are a seventh and less
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 /// What tells whether rule r is enough where no kink is near; far above what force, area and centre are off by, as energies converge later. Its difference from rule r - 1 says so: both converge exponentially, the
@@ -38,7 +38,7 @@ double error_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums&
   const double spread = std::abs(fine.spread - coarse.spread) / fine.spread;
   const double later = r == 1 ? 60.0 : r == 2 ? 25.0 : 10.0;
   const double difference = std::max(relative_difference(fine, coarse), spread / later), root = std::sqrt(difference);
-  // Shares fitted to the errors of patches between ellipsoids, capsules, discs, boxes and blobs; in other poses the least bound was twice
+  // Shares fitted to the errors of patches between ellipsoids, capsules, discs, boxes and blobs; in other poses the least estimate was twice
   // the error.
   switch (r) {
     case 1: return difference * (0.05 + 20.0 * difference + (25.0 + 3600.0 * moved) * moved);
@@ -87,7 +87,7 @@ double PolarRuleSolver::rim_moved() const {
   return moved;
 }
 
-/// @param again  evaluate all rays until the last has ended: bounds on smooth patches take what is left of the way from the pressure at its end
+/// @param again  evaluate all rays until the last has ended: estimates on smooth patches take what is left of the way from the pressure at its end
 bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error, bool again) {
   const std::size_t n = rays.size();
   rim_batch_.resize(n);
@@ -427,11 +427,11 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
     if (difference > kEnough * error && r < last) continue;
     estimate_ = (any ? kSafetyAcross : 1.0) * difference + algebraic_error();
     if (estimate_ > error && !any) return false;
-    // Which rule is enough is not asked of this bound, as energies converge later; but two rules agree by chance where it is far above what they say.
+    // Which rule is enough is not asked of this estimate, as energies converge later; but two rules agree by chance where it is far above what they say.
     if (r <= kFinestJudged && (smooth || (!any && third_.empty() && error < kSplitBelow && clear_of_kinks(pressure)))) {
-      const double bound = bound_by_ends(r, round), least = (r == kFinestJudged ? kLeastOfFinest : kLeastOfBound) * bound;
+      const double by_ends = estimate_by_ends(r, round), least = (r == kFinestJudged ? kLeastOfFinest : kLeastOfEnds) * by_ends;
       if (least > error && r < last) continue;
-      estimate_ = std::min(std::max(estimate_, least), bound);
+      estimate_ = std::min(std::max(estimate_, least), by_ends);
     }
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
     return finish(pressure, rules[r].column, regions, error, round ? &rules[r - 1] : nullptr, points);

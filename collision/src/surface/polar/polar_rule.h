@@ -92,9 +92,9 @@ class PolarRuleSolver {
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double placing_error() const;
   [[nodiscard]] double algebraic_error() const;
-  // Bounds on smooth patches: smooth_bound.cpp.
+  // Estimates on smooth patches: smooth_estimate.cpp.
   [[nodiscard]] double unseen_by_angles(std::size_t r) const;
-  [[nodiscard]] double bound_by_ends(std::size_t r, bool round) const;
+  [[nodiscard]] double estimate_by_ends(std::size_t r, bool round) const;
   [[nodiscard]] bool clear_of_kinks(PairPressure& pressure);
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
 

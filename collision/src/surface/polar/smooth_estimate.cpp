@@ -160,7 +160,7 @@ double PolarRuleSolver::unseen_by_angles(std::size_t r) const {
 }
 
 /// What force, area and centre of pressure of rule r are off by at most on a patch that no kink crosses.
-double PolarRuleSolver::bound_by_ends(std::size_t r, bool round) const {
+double PolarRuleSolver::estimate_by_ends(std::size_t r, bool round) const {
   SUPPLE_EXPECTS(r >= 1 && r <= kFinestJudged);
   const std::size_t radii = gauss_rule(polar_rules()[r].radial).node.size(), angles = rim_.size();
   const GaussRule& gauss = gauss_rule(polar_rules()[r].radial);
