@@ -45,12 +45,14 @@ void say(const char* text) { static_cast<void>(!::write(STDERR_FILENO, text, std
   _exit(static_cast<int>(no_memory ? ErrorKind::Limit : ErrorKind::Internal));
 }
 
+/// Libraries make objects before main, where nobody can catch what they throw: before those.
+[[gnu::constructor(101)]] void begin() { std::set_terminate(end_program); }
+
 }  // namespace
 
 void prepare_last_resort() {
   reserve = std::malloc(kReserve);
   std::set_new_handler(let_reserve_go);
-  std::set_terminate(end_program);
 }
 
 }  // namespace supple::tool

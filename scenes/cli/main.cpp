@@ -27,6 +27,7 @@
 #include "library.h"
 #include "print.h"
 #include "progress_bar.h"
+#include "supple/core/counted.h"
 #include "sweep.h"
 #include "templates.h"
 #include "usage.h"
@@ -319,10 +320,9 @@ int check(const Arguments& arguments) {
                                                          arguments.time_limit > 0.0 ? arguments.time_limit : scenes::kCheckSeconds);
   for (const std::string& warning : found.warnings) print(std::cerr, "warning: %s\n", warning.c_str());
   if (!arguments.quiet) {
-    const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
-    print(std::cout, "%s: %s (%zu object%s, %zu particle%s, %d frames)\n", arguments.scene.c_str(),
-                found.built ? "no fault found" : "no fault found in keys, files and counts", found.objects, plural(found.objects), found.particles,
-                plural(found.particles), found.frames);
+    print(std::cout, "%s: %s (%s, %s, %s)\n", arguments.scene.c_str(),
+                found.built ? "no fault found" : "no fault found in keys, files and counts", counted(found.objects, "object").c_str(),
+                counted(found.particles, "particle").c_str(), counted(static_cast<std::size_t>(found.frames), "frame").c_str());
     std::cout << found.mesh_obstacles;
   }
   return 0;
@@ -339,6 +339,7 @@ int explain(const Arguments& arguments) {
 int query(const Arguments& arguments) {
   scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
   if (arguments.error > 0.0) scene.contact.error = arguments.error;
+  if (!arguments.state.empty()) scene = scenes::scene_to_draw(scene, arguments.state);
   const scenes::StateOrigin origin = scenes::origin_of(scene);
   scenes::Simulation simulation(std::move(scene), question_options(arguments.threads, arguments.memory));
   if (!arguments.state.empty()) simulation.restore(scenes::load_state(arguments.state, origin));

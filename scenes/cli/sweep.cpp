@@ -15,6 +15,7 @@
 #include "library.h"
 #include "print.h"
 #include "progress_bar.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/scenes/job.h"
 #include "supple/scenes/limits.h"
@@ -56,7 +57,7 @@ fs::path planned(const SweepArguments& a) {
                                                      .allowed = a.allowed,
                                                      .outputs = a.outputs});
   scenes::write_plan(a.out, plan, a.overwrite);
-  if (a.plan_only && !a.quiet) print(std::cout, "plan:   %s (%zu points)\n", (fs::path(a.out) / "sweep.json").c_str(), plan.points.size());
+  if (a.plan_only && !a.quiet) print(std::cout, "plan:   %s (%s)\n", (fs::path(a.out) / "sweep.json").c_str(), counted(plan.points.size(), "point").c_str());
   return a.out;
 }
 

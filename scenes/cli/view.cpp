@@ -8,6 +8,7 @@
 
 #include "library.h"
 #include "print.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/limits.h"
@@ -77,7 +78,7 @@ int view(const ViewArguments& a, const std::atomic<int>& interrupt) {
   const scenes::ViewResult result = scenes::write_view(scene, options);
   bar.finish();
   if (!a.quiet) {
-    print(std::cout, "view:   %s (%d frames, %.1f MB, meshes of %d cells)\n", result.page.c_str(), result.frames, 1e-6 * static_cast<double>(result.bytes), result.cells);
+    print(std::cout, "view:   %s (%s, %.1f MB, meshes of %d cells)\n", result.page.c_str(), counted(static_cast<std::size_t>(result.frames), "frame").c_str(), 1e-6 * static_cast<double>(result.bytes), result.cells);
   }
   return 0;
 }

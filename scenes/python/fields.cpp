@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "arrays.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 #include "supple/implicit/polygonise.h"
@@ -24,7 +25,7 @@ namespace {
 /// Poses with other positions and orientations, where they are given.
 std::vector<Pose> moved(std::vector<Pose> pose, const py::object& position, const py::object& orientation) {
   const auto expect_all = [&](const char* argument, std::size_t found) {
-    if (found != pose.size()) refuse(argument, "expected " + std::to_string(pose.size()) + " rows, one per part", std::to_string(found));
+    if (found != pose.size()) refuse(argument, "expected " + counted(pose.size(), "row") + ", one per part", std::to_string(found));
   };
   if (!position.is_none()) {
     const std::vector<Vec3> rows = rows3(position, "position");
@@ -107,7 +108,7 @@ void bind_fields(py::module_& module) {
       .def("evaluate", &evaluate, py::arg("points"),
            "Values F, shape (n,), and gradients [1/m], shape (n, 3), at points [m], shape (n, 3). The outward normal is -gradient / |gradient|.")
       .def("mesh", &mesh_of, py::arg("cells") = 64, "A mesh of the surface, with this number of cells along its longest side.")
-      .def("__repr__", [](const Field& f) { return "<supple.Field, " + std::to_string(f.body->pose().size()) + " parts>"; });
+      .def("__repr__", [](const Field& f) { return "<supple.Field, " + counted(f.body->pose().size(), "part") + ">"; });
 }
 
 }  // namespace supple::python

@@ -2,6 +2,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "arrays.h"
+#include "supple/core/counted.h"
 #include "supple/core/hash.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
@@ -99,8 +100,8 @@ void bind_scene(py::module_& module) {
           "content_hash", [](const Scene& s) { return to_hex(s.content_hash); },
           "Hash of all keys that act on the motion; saved states belong to scenes of the same hash.")
       .def("__repr__", [](const Scene& s) {
-        return "<supple.Scene '" + scenes::scene_name(s) + "', " + std::to_string(s.objects.size()) + " objects, " +
-               std::to_string(s.frame_count()) + " frames>";
+        return "<supple.Scene '" + scenes::scene_name(s) + "', " + counted(s.objects.size(), "object") + ", " +
+               counted(static_cast<std::size_t>(s.frame_count()), "frame") + ">";
       });
 
   module.def(

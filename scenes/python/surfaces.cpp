@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "arrays.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/io/mesh_files.h"
 #include "supple/scenes/pictures.h"
@@ -98,8 +99,8 @@ void bind_surfaces(py::module_& module, Simulation& simulation) {
           "Measures the mesh: whether it is closed, its area and volume, as a MeshReport.")
       .def("write", &write_mesh, py::arg("path"), "Writes a .ply or .obj file.")
       .def("__repr__", [](const Mesh& m) {
-        return "<supple.Mesh, " + std::to_string(m.vertex_count()) + " vertices, " +
-               std::to_string(m.triangle_count()) + " triangles>";
+        return "<supple.Mesh, " + counted(m.vertex_count(), "vertex", "vertices") + ", " +
+               counted(m.triangle_count(), "triangle") + ">";
       });
 
   simulation

@@ -34,19 +34,21 @@ const std::string kTetrahedron = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 TEST(FitRefuses, FilesThatAreNoMesh) {
   EXPECT_EQ(message("mesh.stp", "x"), "mesh.stp: expected a mesh in a file .ply, .obj, .off or .stl, found '.stp'");
   EXPECT_EQ(message("wrong_header.off", "OFX 3 1 0\n0 0 0\n"), "wrong_header.off: expected a mesh, found text or bytes that are none, or that end early; the extension says how a file is read");
-  EXPECT_EQ(message("cut_off.ply", "ply\nformat ascii 1.0\nelement vertex 3\n"), "cut_off.ply: expected a mesh, found text or bytes that are none, or that end early; the extension says how a file is read");
+  EXPECT_EQ(message("cut_off.ply", "ply\nformat ascii 1.0\nelement vertex 3\n"), "cut_off.ply: expected 'end_header', found the end of the file");
   EXPECT_EQ(message("empty.off", "OFF\n0 0 0\n"), "empty.off: expected triangles, found none");
+  EXPECT_EQ(message("large.off", "OFF\n4000000000 1 0\n0 0 0\n"), "large.off: expected a mesh, found text or bytes that are none, or that end early; the extension says how a file is read");
   try {
-    (void)fit(temp_folder() / "absent.off");
+    (void)fit(temp_folder() / "wrong_heade.off");
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::Io);
+    EXPECT_TRUE(std::string(error.what()).ends_with("wrong_heade.off: cannot be read: No such file or directory; did you mean 'wrong_header.off'?")) << error.what();
   }
 }
 
 TEST(FitRefuses, SurfacesWithoutInside) {
   EXPECT_EQ(message("open.off", off("0 0 0\n1 0 0\n1 1 0\n0 1 0\n", "3 0 1 2\n3 0 2 3\n")),
-            "open.off: expected holes whose closing adds less than a tenth of the area, found 1 holes, the largest part at (1, 0, 0); close them in a mesh editor; surfaces without inside are not fitted");
+            "open.off: expected holes whose closing adds less than a tenth of the area, found 1 hole, the largest part at (1, 0, 0); close them in a mesh editor; surfaces without inside are not fitted");
   EXPECT_EQ(message("flat.off", off("0 0 0\n1 0 0\n1 1 0\n0 1 0\n", "3 0 1 2\n3 0 2 3\n3 1 0 3\n3 1 3 2\n")),
             "flat.off: expected a mesh that encloses a volume, found a flat one; surfaces without inside are not fitted");
 }

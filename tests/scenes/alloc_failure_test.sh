@@ -70,12 +70,13 @@ ends() {
 }
 
 step=${4:-$(( count / 40 ))}
+for n in 1 2 30 60; do ends "$n"; done  # before main
 for ((n = step; n <= count; n += step)); do ends "$n"; done
 for ((n = count - count / 30; n <= count; n += 17)); do ends "$n"; done
 threads=3
 for ((n = 7 * step; n < count; n += 9 * step)); do ends "$n"; done
 threads=1
-# Pictures by the path tracer, whose triangles Embree keeps, and grids by OpenVDB. What libraries ask for before main nobody can catch.
+# Pictures by the path tracer, whose triangles Embree keeps, and grids by OpenVDB.
 if "$supple" run scene.yaml --out probe --progress none --set 'output={images: {size: [16, 16]}}' --set render.renderer=path > /dev/null 2>&1; then
   outputs=(--set 'output={images: {size: [32, 24], samples: 1}, film: false, grid: vdb, cell: 0.12}' --set render.renderer=path --set render.most_samples=4)
   SUPPLE_FAIL_COUNT=$scratch/count LD_PRELOAD=$library run whole --overwrite || { cat err.txt; exit 1; }

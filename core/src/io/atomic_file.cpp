@@ -4,30 +4,37 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <random>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "supple/core/error.h"
+#include "supple/core/nearest_word.h"
 
 namespace supple::io {
 namespace {
 
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what, int code) {
+constexpr std::size_t kMostNames = 10000;  // of a folder that are compared
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what, int code, std::string hint = {}) {
   throw Error(ErrorKind::Io, Fault{.place = path.string(),
                                    .key = {},
                                    .expected = what + ": " + std::system_category().message(code),
                                    .found = {},
-                                   .hint = {}});
+                                   .hint = std::move(hint)});
 }
+
+[[noreturn]] void fail_to_read(const std::filesystem::path& path, int code) { fail(path, "cannot be read", code, code == ENOENT || code == ENOTDIR ? hint_of_absent(path) : ""); }
 
 /// @throws Error{Io} where what is open is neither a regular file nor a folder, whose reading fails by itself
 void expect_regular(const std::filesystem::path& path, const Descriptor& descriptor) {
   struct stat status {};
-  if (::fstat(descriptor.get(), &status) != 0) fail(path, "cannot be read", errno);
+  if (::fstat(descriptor.get(), &status) != 0) fail_to_read(path, errno);
   if (S_ISREG(status.st_mode) || S_ISDIR(status.st_mode)) return;
   throw Error(ErrorKind::Io, Fault{.place = path.string(),
                                    .key = {},
@@ -122,12 +129,28 @@ Descriptor open_to_read(const std::filesystem::path& path) {
   return descriptor;
 }
 
+std::string hint_of_absent(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path();
+  std::error_code failed;
+  if (!fs::is_directory(folder, failed)) return "there is no folder '" + folder.string() + '\'';
+  std::vector<std::string> names;
+  for (fs::directory_iterator at(folder, failed); !failed && at != fs::directory_iterator() && names.size() < kMostNames; at.increment(failed)) {
+    std::string name = at->path().filename().string();
+    if (!name.starts_with('.')) names.push_back(std::move(name));
+  }
+  std::sort(names.begin(), names.end());  // folders have no order of their own
+  const std::vector<std::string_view> words(names.begin(), names.end());
+  const std::string near = nearest_word(path.filename().string(), words);
+  return near.empty() ? "" : "did you mean '" + near + "'?";
+}
+
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit) {
   const Descriptor descriptor = open_to_read(path);
-  if (!descriptor.is_open()) fail(path, "cannot be read", errno);
+  if (!descriptor.is_open()) fail_to_read(path, errno);
   struct stat status {};
-  if (::fstat(descriptor.get(), &status) != 0) fail(path, "cannot be read", errno);
-  if (S_ISDIR(status.st_mode)) fail(path, "cannot be read", EISDIR);
+  if (::fstat(descriptor.get(), &status) != 0) fail_to_read(path, errno);
+  if (S_ISDIR(status.st_mode)) fail_to_read(path, EISDIR);
   const auto refuse = [&](std::size_t size) {
     throw Error(ErrorKind::Limit, Fault{.place = path.string(),
                                         .key = {},
@@ -144,7 +167,7 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t 
   for (;;) {
     if (used == bytes.size()) bytes.resize(used + 4096);
     const ssize_t count = retried([&] { return ::read(descriptor.get(), bytes.data() + used, bytes.size() - used); });
-    if (count < 0) fail(path, "cannot be read", errno);
+    if (count < 0) fail_to_read(path, errno);
     if (count == 0) break;
     used += static_cast<std::size_t>(count);
     if (used > limit) refuse(used);

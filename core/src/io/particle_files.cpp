@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "io/number_text.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/core/io/mesh_files.h"
@@ -162,7 +163,7 @@ NumberTable read_csv_columns(const std::filesystem::path& path) {
   while (next_words(text, number, words)) {
     const std::string place = path.string() + ':' + std::to_string(number);
     if (words.size() != table.name.size()) {
-      refuse_file(place, "expected " + std::to_string(table.name.size()) + " numbers, one of each name in the first line", std::to_string(words.size()));
+      refuse_file(place, "expected " + counted(table.name.size(), "number") + ", one of each name in the first line", std::to_string(words.size()));
     }
     for (std::size_t k = 0; k < words.size(); ++k) {
       const std::optional<double> value = finite_number(words[k]);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -387,7 +388,8 @@ NumberTable read_ply_vertices(const std::filesystem::path& path) {
 }
 
 Mesh read_mesh(const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension != ".obj" && extension != ".ply") refuse(path.string(), "expected a mesh in a file .obj or .ply", "'" + extension + '\'');
   const std::vector<std::byte> bytes = read_file(path, kLargestInput);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());

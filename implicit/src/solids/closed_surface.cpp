@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 
@@ -109,7 +110,7 @@ void expect_closed(const Welded& mesh, const std::vector<Side>& sides) {
   while (first + count < sides.size() && sides[first + count].low == sides[first].low && sides[first + count].high == sides[first].high) ++count;
   const std::string others = open == 1 ? "" : "; " + std::to_string(open - 1) + (open == 2 ? " other edge is" : " other edges are") + " open, too";
   refuse("expected a closed surface, every edge between two triangles",
-         (count == 1 ? "one triangle" : std::to_string(count) + " triangles") + " at " + edge_text(mesh, sides[first]) + others,
+         (count == 1 ? "one triangle" : counted(count, "triangle")) + " at " + edge_text(mesh, sides[first]) + others,
          "close its holes, so that it has an inside");
 }
 

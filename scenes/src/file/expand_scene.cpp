@@ -7,6 +7,7 @@
 #include "file/fields_info.h"
 #include "file/scene_places.h"
 #include "file/shipped_includes.h"
+#include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {
 namespace {
@@ -110,9 +111,10 @@ class Includes {
       text = read_text(path);
     } catch (const Error& error) {
       const Fault& fault = error.faults().front();
-      return fail(fault.expected, fault.found, fault.hint);
+      return fail(fault.expected, '\'' + shown(name.text) + "', " + fault.found, fault.hint);
     }
-    if (!text) return fail("expected a readable scene file", std::filesystem::exists(real, unknown) ? "a file that cannot be read" : "nothing", "");
+    if (!text && std::filesystem::exists(real, unknown)) return fail("expected a readable scene file", '\'' + shown(name.text) + "', which cannot be read", "");
+    if (!text) return fail("expected a readable scene file", "no file '" + shown(name.text) + '\'', io::hint_of_absent(path));
     const std::uint32_t source = texts_.add(path.string(), std::move(*text), false);
     Node* root = parse_yaml(texts_.text(source), source, tree_, faults_);
     if (root == nullptr) return nullptr;

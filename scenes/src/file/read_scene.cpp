@@ -13,6 +13,7 @@
 #include "file/scale_object.h"
 #include "file/scene_keys.h"
 #include "file/scene_places.h"
+#include "supple/core/io/atomic_file.h"
 #include "supple/scenes/accuracy.h"
 
 namespace supple::scenes {
@@ -237,19 +238,20 @@ const SceneSource* source_of(const Scene& scene) { return scene.places ? &scene.
 
 Scene read_scene(const std::filesystem::path& path, std::span<const std::string> overrides, std::span<const std::filesystem::path> allowed) {
   std::error_code status;
-  const auto fail = [&](std::string found) {
+  const auto fail = [&](std::string found, std::string hint = {}) {
     throw Error(ErrorKind::Io, Fault{.place = path.string(),
                                      .key = "",
                                      .expected = "expected a readable scene file",
                                      .found = std::move(found),
-                                     .hint = ""});
+                                     .hint = std::move(hint)});
   };
   if (std::filesystem::is_directory(path, status)) fail("a folder");
   const std::string name = path.filename().string();  // outputs have this name, also in files that cannot hold any name
   if (std::any_of(name.begin(), name.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7F; })) fail("a name with control characters");
   if (name.starts_with('.')) fail("a name that begins with a dot");  // "...yaml" would be the scene "..", whose folder is not its own
   const std::optional<std::string> text = read_text(path);
-  if (!text) fail(std::filesystem::exists(path, status) ? "a file that cannot be read" : "nothing");
+  if (!text && std::filesystem::exists(path, status)) fail("a file that cannot be read");
+  if (!text) fail("no file of this name", io::hint_of_absent(path));
   Scene scene = parse_scene(*text, path.string(), path.parent_path(), overrides, allowed);
   scene.source = path;
   return scene;

@@ -11,6 +11,7 @@
 #include "fit/measure.h"
 #include "fit/packing.h"
 #include "fit/solve.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/math.h"
@@ -306,8 +307,8 @@ void report_errors(FittedObject& object, const Data& data, const Skeleton& skele
     report.warnings.emplace_back(text.data());
   }
   if (report.genus_in != report.genus_out || report.pieces_out != 1) {
-    report.warnings.push_back("the fitted surface has " + std::to_string(report.pieces_out) + " pieces and " + std::to_string(report.genus_out) + " handles, the data has 1 and " +
-                              std::to_string(report.genus_in));
+    report.warnings.push_back("the fitted surface has " + counted(report.pieces_out, "piece") + " and " + counted(static_cast<std::size_t>(std::max(0L, report.genus_out)), "handle") + ", the data has 1 piece and " +
+                              counted(static_cast<std::size_t>(std::max(0L, report.genus_in)), "handle"));
   }
 }
 

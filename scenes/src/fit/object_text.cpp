@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "supple/core/counted.h"
 #include "supple/core/printable.h"
 #include "supple/fit/fit.h"
 
@@ -43,7 +44,7 @@ std::string object_text(const FittedObject& object, const std::string& title) {
   const FitReport& r = object.report;
   std::string out;
   out += "# " + printable(title) + '\n';
-  put(out, "# %zu primitives on %zu particles; distance to the data: RMS %.2g %%, largest %.2g %% of the diagonal.\n", r.primitives, r.particles, 100.0 * std::max(r.from_data.rms, r.to_data.rms),
+  put(out, "# %s on %s; distance to the data: RMS %.2g %%, largest %.2g %% of the diagonal.\n", counted(r.primitives, "primitive").c_str(), counted(r.particles, "particle").c_str(), 100.0 * std::max(r.from_data.rms, r.to_data.rms),
       100.0 * r.two_sided());
   out += "# A scene uses it by `include` in an item of `objects`, where other keys replace these.\n";
   out += "# The origin is the centre of mass, in the data " + point_text(object.origin) + ".\n";
@@ -87,8 +88,8 @@ std::string report_json(const FitReport& r) {
 
 std::string report_text(const FitReport& r) {
   std::string out;
-  put(out, "data:       %zu triangles, %.4g m across, %zu holes closed\n", r.repair.triangles, r.diagonal, r.repair.holes);
-  put(out, "primitives: %zu\nparticles:  %zu, %zu bonds%s\n", r.primitives, r.particles, r.bonds, r.rigid ? ", no free modes beyond six" : ", in parts that nothing joins");
+  put(out, "data:       %s, %.4g m across, %s closed\n", counted(r.repair.triangles, "triangle").c_str(), r.diagonal, counted(r.repair.holes, "hole").c_str());
+  put(out, "primitives: %zu\nparticles:  %zu, %s%s\n", r.primitives, r.particles, counted(r.bonds, "bond").c_str(), r.rigid ? ", no free modes beyond six" : ", in parts that nothing joins");
   put(out, "distance:   RMS %.3g %%, largest %.3g %% from the data; RMS %.3g %%, largest %.3g %% to it (of the diagonal)\n", 100.0 * r.from_data.rms, 100.0 * r.from_data.largest, 100.0 * r.to_data.rms,
       100.0 * r.to_data.largest);
   put(out, "volume:     %+.2f %%\nhandles:    %ld of %ld\nseconds:    %.1f\n", 100.0 * r.volume_error, r.genus_out, r.genus_in, r.seconds);

@@ -1,5 +1,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/IO/polygon_soup_io.h>
+#include <CGAL/IO/OFF.h>
+#include <CGAL/IO/OFF/File_header_OFF.h>
+#include <CGAL/IO/STL.h>
 #include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
@@ -16,9 +18,13 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <sstream>
 
 #include "fit/surface.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
+#include "supple/core/io/atomic_file.h"
+#include "supple/core/io/read_mesh.h"
 
 namespace supple::fit {
 namespace {
@@ -45,6 +51,33 @@ struct Soup {
   std::vector<std::vector<std::size_t>> faces;
 };
 
+[[noreturn]] void refuse_format(const std::filesystem::path& file) {
+  refuse(file, "expected a mesh", "text or bytes that are none, or that end early", "the extension says how a file is read");
+}
+
+/// OFF and STL by CGAL, from memory: its streams take a disk that fails for the end of a file.
+Soup read_by_cgal(const std::filesystem::path& file, bool off) {
+  const std::vector<std::byte> bytes = io::read_file(file, io::kLargestInput);
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  std::istringstream in(text);
+  Soup soup;
+  if (off) {
+    std::istringstream start(text);
+    CGAL::File_header_OFF header;
+    // Memory is taken for as many as the header says.
+    if (!(start >> header) || header.size_of_vertices() > bytes.size() || header.size_of_facets() > bytes.size()) refuse_format(file);
+    if (!CGAL::IO::read_OFF(in, soup.points, soup.faces, CGAL::parameters::verbose(false))) refuse_format(file);
+    return soup;
+  }
+  CGAL::IO::set_mode(in, CGAL::IO::BINARY);
+  if (CGAL::IO::read_STL(in, soup.points, soup.faces, CGAL::parameters::verbose(false))) return soup;
+  soup = {};
+  std::istringstream again(text);
+  CGAL::IO::set_mode(again, CGAL::IO::ASCII);
+  if (!CGAL::IO::read_STL(again, soup.points, soup.faces, CGAL::parameters::verbose(false).use_binary_mode(false))) refuse_format(file);
+  return soup;
+}
+
 Soup read_soup(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -52,16 +85,18 @@ Soup read_soup(const std::filesystem::path& file) {
   if (std::find(kKnown.begin(), kKnown.end(), extension) == kKnown.end()) {
     refuse(file, "expected a mesh in a file .ply, .obj, .off or .stl", extension.empty() ? "no extension" : '\'' + extension + '\'', "", ErrorKind::Usage);
   }
-  std::error_code unknown;
-  if (!std::filesystem::is_regular_file(file, unknown)) refuse(file, "expected a file that can be read", "none", "", ErrorKind::Io);
   Soup soup;
-  if (!CGAL::IO::read_polygon_soup(file.string(), soup.points, soup.faces, CGAL::parameters::verbose(false))) {
-    refuse(file, "expected a mesh", "text or bytes that are none, or that end early", "the extension says how a file is read");
+  if (extension == ".off" || extension == ".stl") {
+    soup = read_by_cgal(file, extension == ".off");
+  } else {
+    const Mesh mesh = io::read_mesh(file);
+    for (const Vec3& p : mesh.position) soup.points.emplace_back(p.x(), p.y(), p.z());
+    for (const auto& t : mesh.triangle) soup.faces.push_back({t[0], t[1], t[2]});
   }
   if (soup.faces.empty()) refuse(file, "expected triangles", "none", "");
   for (const std::vector<std::size_t>& face : soup.faces) {
     for (const std::size_t corner : face) {
-      if (corner >= soup.points.size()) refuse(file, "expected corners among the " + std::to_string(soup.points.size()) + " vertices", std::to_string(corner), "");
+      if (corner >= soup.points.size()) refuse(file, "expected corners among the " + counted(soup.points.size(), "vertex", "vertices"), std::to_string(corner), "");
     }
   }
   for (const Point& p : soup.points) {
@@ -82,7 +117,7 @@ void expect_two_faces_at_edges(const std::filesystem::path& file, const Soup& so
   const auto first = std::find_if(faces.begin(), faces.end(), many);
   if (first == faces.end()) return;
   refuse(file, "expected at most two triangles at every edge",
-         std::to_string(std::count_if(faces.begin(), faces.end(), many)) + " edges with more, one from " + text_of(soup.points[first->first.first]) + " to " +
+         counted(static_cast<std::size_t>(std::count_if(faces.begin(), faces.end(), many)), "edge") + " with more, one from " + text_of(soup.points[first->first.first]) + " to " +
              text_of(soup.points[first->first.second]),
          "remove walls inside, or join the parts into one solid");
 }
@@ -100,7 +135,7 @@ void close_holes(const std::filesystem::path& file, SurfaceMesh& mesh, Repair& r
     closed += pmp::area(patch, mesh);
     ++repair.holes;
     if (closed > kMostClosed * (area + closed)) {
-      refuse(file, "expected holes whose closing adds less than a tenth of the area", std::to_string(cycles.size()) + " holes, the largest part at " + text_of(at),
+      refuse(file, "expected holes whose closing adds less than a tenth of the area", counted(cycles.size(), "hole") + ", the largest part at " + text_of(at),
              "close them in a mesh editor; surfaces without inside are not fitted");
     }
   }

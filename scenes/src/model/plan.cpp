@@ -277,6 +277,8 @@ bool suits_implicit(const Model& model) {
   return model.interactions.literal_form.empty() && model.interactions.geometric_lennard_jones.empty() && model.interactions.gay_berne.empty();
 }
 
+std::string steps_text(double count, const char* kind = "") { return number_text(count) + ' ' + kind + (count == 1.0 ? "step" : "steps"); }
+
 /// `auto` without `accuracy`.
 void choose_by_stability(const Scene& scene, const Model& model, const StepCounts& counts, IntegratorPlan& plan) {
   const double explicit_steps = counts.of(std::hypot(plan.pair_frequency, model.contact_frequency), {});
@@ -284,14 +286,14 @@ void choose_by_stability(const Scene& scene, const Model& model, const StepCount
   const bool refused = explicit_steps > scene.time_step.max_substeps;
   const bool implicit = suits_implicit(model) && (refused || explicit_steps > kImplicitCost * implicit_steps);
   plan.settings.method = implicit ? core::Integrator::BackwardEuler : core::Integrator::Symplectic;
-  const std::string taken = number_text(explicit_steps) + " steps of velocity Verlet per frame";
+  const std::string taken = steps_text(explicit_steps) + " of velocity Verlet per frame";
   const std::string size =
       counts.longest() < counts.frame() ? " (time_step.size: at most " + number_text(counts.longest()) + " s)" : "";
   if (!implicit) {
     plan.reason = "symplectic: " + taken + " at the start" + size;
     return;
   }
-  plan.reason = "backward_euler: " + number_text(implicit_steps) + " steps per frame instead of " + taken + size +
+  plan.reason = "backward_euler: " + steps_text(implicit_steps) + " per frame instead of " + taken + size +
                 (refused ? ", which are more than time_step.max_substeps" : "; damps motion that its steps do not resolve");
 }
 
@@ -308,7 +310,7 @@ bool choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts
   const bool implicit = suits_implicit(model) && (refused || explicit_steps > cost * implicit_steps);
   plan.settings.method = implicit ? core::Integrator::ImplicitMidpoint : core::Integrator::Symplectic;
   plan.reason = std::string(implicit ? "implicit_midpoint" : "symplectic") + ": accuracy " + number_text(accuracy) + " takes " +
-                number_text(implicit_steps) + " implicit steps per frame, or " + number_text(explicit_steps) + " of velocity Verlet" +
+                steps_text(implicit_steps, "implicit ") + " per frame, or " + number_text(explicit_steps) + " of velocity Verlet" +
                 (!dissipates ? "" : friction < damping ? ", to resolve damping between particles" : ", to resolve friction") +
                 (refused ? ", which are more than time_step.max_substeps" : "; an implicit step costs as much as " + number_text(std::round(cost)));
   return (implicit ? implicit_steps : explicit_steps) <= scene.time_step.max_substeps;
@@ -324,7 +326,7 @@ void take_implicit(const Scene& scene, const Model& model, const StepCounts& cou
     return;
   }
   plan.settings.method = core::Integrator::ImplicitMidpoint;
-  plan.reason = "implicit_midpoint: " + (fixed > 0.0 ? "steps of " + number_text(fixed) + " s" : number_text(counts.of(counts.resolved(plan.pair_frequency), plan.bounds)) + " steps per frame") +
+  plan.reason = "implicit_midpoint: " + (fixed > 0.0 ? "steps of " + number_text(fixed) + " s" : steps_text(counts.of(counts.resolved(plan.pair_frequency), plan.bounds)) + " per frame") +
                 " resolve contact";
 }
 

@@ -11,6 +11,7 @@
 #include "file/read_scene_faults.h"
 #include "model/model_contact.h"
 #include "output/search_choice.h"
+#include "supple/core/counted.h"
 
 namespace supple::scenes {
 namespace {
@@ -54,8 +55,7 @@ void add_passing(const Model& model, std::vector<std::string>& warnings) {
     const std::size_t pairs = object.overlapping.size();
     if (pairs > 0) {
       const collision::BodyPair& one = object.overlapping.front();
-      warnings.push_back(key + "parts that do not blend overlap at the start, and touch only once they have been apart: " + std::to_string(pairs) +
-                         (pairs == 1 ? " pair" : " pairs") + ", the first with particles " + std::to_string(one.a) + " and " +
+      warnings.push_back(key + "parts that do not blend overlap at the start, and touch only once they have been apart: " + counted(pairs, "pair") + ", the first with particles " + std::to_string(one.a) + " and " +
                          std::to_string(one.b));
     }
   }
@@ -117,7 +117,7 @@ void add_mended_meshes(const Model& model, std::vector<std::string>& warnings) {
     const implicit::MeshSolid::Report& report = solid->report();
     const std::string key = "obstacles." + body.name + ".file: ";
     if (report.turned > 0) {
-      warnings.push_back(key + std::to_string(report.turned) + (report.turned == 1 ? " triangle is" : " triangles are") +
+      warnings.push_back(key + counted(report.turned, "triangle is", "triangles are") +
                          " reversed, as most of the triangles that share their edges are oriented the other way");
     }
     if (report.deviation > kMuch * report.size) {

@@ -1,4 +1,5 @@
 #include "supple/scenes/accuracy.h"
+#include "supple/core/counted.h"
 #include "supple/scenes/estimate.h"
 
 #include <sys/resource.h>
@@ -208,7 +209,7 @@ std::string text_of(const RunEstimate& e) {
   line("disk", bytes_text(e.disk));
   line("CPU time", time_text(e.simulation_s) + " for steps, " + time_text(e.drawing_s) + " for meshes, pictures and files");
   line("time", "about " + time_text(e.wall_s) + " on an idle machine");
-  line("measured", std::to_string(e.calibrated) + " frames in full, " + std::to_string(e.followed) + " of " + std::to_string(e.frames) + " with coarse contact");
+  line("measured", counted(static_cast<std::size_t>(e.calibrated), "frame") + " in full, " + std::to_string(e.followed) + " of " + std::to_string(e.frames) + " with coarse contact");
   return text;
 }
 

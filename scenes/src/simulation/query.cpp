@@ -1,4 +1,5 @@
 #include "supple/scenes/accuracy.h"
+#include "supple/core/counted.h"
 #include "supple/scenes/query.h"
 
 #include <algorithm>
@@ -280,7 +281,7 @@ std::string self_contact_text(const ObjectModel& object) {
   const auto add_exceptions = [&](bool of_groups) {
     const auto except = [&](const std::vector<collision::BodyPair>& pairs, const char* which) {
       const auto count = std::count_if(pairs.begin(), pairs.end(), [&](const collision::BodyPair& pair) { return object.are_groups(pair) == of_groups; });
-      if (count > 0) text += "; except " + std::to_string(count) + (count == 1 ? " pair " : " pairs ") + which;
+      if (count > 0) text += "; except " + counted(static_cast<std::size_t>(count), "pair") + ' ' + which;
     };
     except(object.bonded, "with a bond");
     except(object.overlapping, "that overlap at the start, until they have been apart");
@@ -292,7 +293,7 @@ std::string self_contact_text(const ObjectModel& object) {
     add_exceptions(false);
   }
   if (!object.group.empty()) {
-    text += (text.empty() ? "" : "; ") + std::to_string(object.group.size()) + " groups touch the groups that they do not blend with, by their own fields";
+    text += (text.empty() ? "" : "; ") + counted(object.group.size(), "group touches the groups that it does not blend with, by its own field", "groups touch the groups that they do not blend with, by their own fields");
     add_exceptions(true);
   }
   return text;
@@ -311,13 +312,11 @@ std::string explain(Simulation& simulation) {
     row.pop_back();
     out += row + "\n";
   };
-  const auto plural = [](std::size_t n) { return n == 1 ? "" : "s"; };
-  line("%zu object%s, %zu particle%s, %d frames at %g per second", model.objects.size(), plural(model.objects.size()),
-       model.particles.size(), plural(model.particles.size()), scene.frame_count(), scene.frame_rate);
+  line("%s, %s, %s at %g per second", counted(model.objects.size(), "object").c_str(), counted(model.particles.size(), "particle").c_str(),
+       counted(static_cast<std::size_t>(scene.frame_count()), "frame").c_str(), scene.frame_rate);
   for (const ObjectModel& o : model.objects) {
-    const std::size_t primitives = o.skeleton.primitive.size();
-    line("  %-16s %u particle%s, %zu primitive%s, %zu surface samples%s", o.name.c_str(), o.last - o.first,
-         plural(o.last - o.first), primitives, plural(primitives), o.samples.size(), o.collides ? "" : ", no contact");
+    line("  %-16s %s, %s, %s%s", o.name.c_str(), counted(o.last - o.first, "particle").c_str(), counted(o.skeleton.primitive.size(), "primitive").c_str(),
+         counted(o.samples.size(), "surface sample").c_str(), o.collides ? "" : ", no contact");
     if (const std::string text = self_contact_text(o); !text.empty()) line("  %-16s %s", "", text.c_str());
   }
   try {
@@ -349,7 +348,7 @@ std::string explain(Simulation& simulation) {
   const std::vector<collision::ContactSurface::Summary>& pairs = simulation.contacts().summary;
   constexpr std::size_t kMostShown = 10;
   const double given_error = model.contact.error;
-  line("\n%zu contact%s at frame %d", pairs.size(), plural(pairs.size()), simulation.frame());
+  line("\n%s at frame %d", counted(pairs.size(), "contact").c_str(), simulation.frame());
   for (std::size_t k = 0; k < std::min(pairs.size(), kMostShown); ++k) {
     const auto& s = pairs[k];
     const std::string missed = misses_error(s, given_error) ? ", above the given " + short_text(given_error) : "";
@@ -367,9 +366,9 @@ std::string describe_mesh_obstacles(const Model& model) {
     const auto* solid = std::get_if<implicit::MeshSolid>(&body.solid);
     if (solid == nullptr) continue;
     const implicit::MeshSolid::Report& report = solid->report();
-    text += "  obstacle " + body.name + ": surface of " + std::to_string(solid->mesh().triangle_count()) + " triangles, ";
+    text += "  obstacle " + body.name + ": surface of " + counted(solid->mesh().triangle_count(), "triangle") + ", ";
     text += "deviates by at most " + short_text(report.deviation) + " m, " + short_text(100.0 * report.deviation / report.size) + " % of its size";
-    if (report.crossing > 0) text += ", as " + std::to_string(report.crossing) + " triangles of its file cross or touch others";
+    if (report.crossing > 0) text += ", as " + counted(report.crossing, "triangle of its file crosses or touches others", "triangles of its file cross or touch others");
     text += '\n';
   }
   return text;

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "output/spare_memory.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
@@ -87,8 +88,8 @@ Commands commands_of(const Scene& scene, const JobOptions& options) {
   out.each.insert(out.each.end(), tail.begin(), tail.end());
   out.last = out.each;
   out.logs = whole(options.folder) / "logs";
-  out.about = "Job of the scene '" + out.name + "', fingerprint " + fingerprint + ": " + std::to_string(out.frames) + " frames in " +
-              std::to_string(out.tasks) + " tasks.";
+  out.about = "Job of the scene '" + out.name + "', fingerprint " + fingerprint + ": " + counted(static_cast<std::size_t>(out.frames), "frame") + " in " +
+              counted(static_cast<std::size_t>(out.tasks), "task") + ".";
   return out;
 }
 
@@ -103,7 +104,7 @@ Commands commands_of(const fs::path& folder, const JobOptions& options) {
   out.last = out.each;
   out.last.emplace_back("--collect");
   out.logs = whole(folder) / "logs";
-  out.about = "Job of the sweep '" + out.name + "', fingerprint " + fingerprint + ": " + std::to_string(out.tasks) + " points.";
+  out.about = "Job of the sweep '" + out.name + "', fingerprint " + fingerprint + ": " + counted(static_cast<std::size_t>(out.tasks), "point") + ".";
   return out;
 }
 

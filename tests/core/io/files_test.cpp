@@ -84,6 +84,8 @@ TEST_F(Files, ThatAreAbsentOrTooLargeAreNamed) {
   expect_error(ErrorKind::Io, "cannot be read: Is a directory",
                [&] { static_cast<void>(io::read_file(path("."), 10)); });
   io::write_atomically(path("large"), std::string_view("12345678901"));
+  expect_error(ErrorKind::Io, "lagre: cannot be read: No such file or directory; did you mean 'large'?", [&] { static_cast<void>(io::read_file(path("lagre"), 10)); });
+  expect_error(ErrorKind::Io, "No such file or directory; there is no folder '" + path("below").string() + "'", [&] { static_cast<void>(io::read_file(path("below") / "large", 10)); });
   expect_error(ErrorKind::Limit, "expected at most 10 bytes, found 11",
                [&] { static_cast<void>(io::read_file(path("large"), 10)); });
   EXPECT_EQ(io::read_file(path("large"), 11).size(), 11U);

@@ -339,7 +339,7 @@ TEST(SceneReader, SaysWhenAFileCannotBeRead) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::Io);
-    EXPECT_STREQ(error.what(), "/no/such/scene.yaml: expected a readable scene file, found nothing");
+    EXPECT_STREQ(error.what(), "/no/such/scene.yaml: expected a readable scene file, found no file of this name; there is no folder '/no/such'");
   }
 }
 

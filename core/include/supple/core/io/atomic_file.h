@@ -54,6 +54,9 @@ void rename_whole(const std::filesystem::path& from, const std::filesystem::path
 /// Opens a file for reading. None, with errno, where that fails. @throws Error{Io} for pipes, devices and sockets, whose reading may never end
 [[nodiscard]] Descriptor open_to_read(const std::filesystem::path& path);
 
+/// Hint for a file that is absent: the name nearest to its own in its folder, "did you mean 'points.csv'?", or the folder that does not exist; else "".
+[[nodiscard]] std::string hint_of_absent(const std::filesystem::path& path);
+
 /// The whole file. @throws Error{Io} when it cannot be read or is none of the regular ones, Error{Limit} when it is larger than `limit` bytes.
 [[nodiscard]] std::vector<std::byte> read_file(const std::filesystem::path& path, std::size_t limit);
 
