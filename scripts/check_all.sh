@@ -70,7 +70,7 @@ else
 fi
 if ! chose install; then
   :
-elif part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3; then
+elif part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_CGAL=ON -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3; then
   part "headers stand alone" "$logs/headers.log" \
     configure_and_build release all_verify_interface_header_sets || true
   part "installed package" "$logs/package.log" check_package "$supple_root/build/release" || true

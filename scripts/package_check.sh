@@ -33,9 +33,23 @@ check_benchmarks() {
   [[ $(grep -c '"hash"' "$rows") -ge 4 && $(grep -c '"largest_error"' "$rows") == 2 ]] || { echo "error: expected rows of core/spiral and of two scenes"; return 1; }
 }
 
+# write_box FOLDER: a closed mesh, and a scene of the object that fits it.
+write_box() {
+  printf 'OFF\n8 12 0\n0 0 0\n2 0 0\n2 1 0\n0 1 0\n0 0 1\n2 0 1\n2 1 1\n0 1 1\n' >"$1/box.off"
+  printf '3 %s\n' '0 2 1' '0 3 2' '4 5 6' '4 6 7' '0 1 5' '0 5 4' '1 2 6' '1 6 5' '2 3 7' '2 7 6' '3 0 4' '3 4 7' >>"$1/box.off"
+  printf 'schema: 1\nduration: 0.1\nframe_rate: 10\nobjects: [{name: box, include: box.yaml}]\n' >"$1/box_scene.yaml"
+}
+
+# check_fit SUPPLE SCRATCH: fits a box by an installed tool, called from elsewhere, and reads the object in a scene.
+check_fit() {
+  local supple=$1 folder=$2
+  write_box "$folder"
+  (cd / && "$supple" fit "$folder/box.off" -o "$folder/box.yaml" --error 5% --particles 8 --overwrite && "$supple" check "$folder/box_scene.yaml")
+}
+
 # check_package BUILD_FOLDER: installs a build with its benchmarks into a scratch prefix and moves it; checks that no path of the source, the build or a
-# library is exported and that scenes, documents, licence and benchmarks are installed; tests each component alone; builds tests/package against
-# the whole package and runs it on a scene.
+# library is exported and that scenes, documents, licence, benchmarks and, where it is built, the program of fits are installed; tests each component alone;
+# builds tests/package against the whole package and runs it on a scene.
 check_package() {
   local build=$1 scratch=$supple_root/build/package name
   rm -rf "$scratch"
@@ -49,6 +63,7 @@ check_package() {
     [[ -n $(find "$scratch/prefix" -name "$name") ]] || { echo "error: $name is not installed"; return 1; }
   done
   check_benchmarks "$scratch/prefix/bin/supple" "$scratch" || return 1
+  if [[ -n $(find "$scratch/prefix" -name supple_fitTargets.cmake) ]]; then check_fit "$scratch/prefix/bin/supple" "$scratch" || return 1; fi
   for name in core implicit cgal collision render scenes fit; do
     [[ -f $(find "$scratch/prefix" -name "supple_${name}Targets.cmake") ]] || continue
     check_component "$name" "$scratch/prefix" "$scratch" || { echo "error: component $name fails alone"; return 1; }
@@ -77,6 +92,7 @@ check_deb() {
   [[ -f $sources ]] || sources=/etc/apt/sources.list
   mmdebstrap --quiet --variant=minbase --include=ca-certificates "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$scratch/root" "$sources" || return 1
   cp "$package" "$scratch/root/supple.deb"
+  write_box "$scratch/root/root"
   mount -t proc proc "$scratch/root/proc" || return 1  # by which the tool finds its library
   chroot "$scratch/root" sh -eu -c '
     apt-get -q update && DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends /supple.deb
@@ -85,6 +101,7 @@ check_deb() {
     supple view out/two_balls --progress none && test -s out/two_balls/two_balls_view.html
     supple check ball_hits_spiral
     supple bench scenes/spiral_uncoils
+    test ! -x /usr/libexec/supple/supple_fit || { supple fit box.off -o box.yaml --error 5% --particles 8 && supple check box_scene.yaml; }
     python3 -c "import supple; print(supple.library(\"two_balls\"))"
     test -s /usr/share/supple/blender/supple_import.py && test -s /usr/share/man/man1/supple.1'
   local result=$?
@@ -100,6 +117,7 @@ check_wheel() {
   PYTHON=$python "$supple_root/scripts/wheel.sh" --build "$build" --out "$scratch" || return 1
   "$python" -m venv "$scratch/new" && "$scratch/new/bin/pip" install --quiet --disable-pip-version-check "$scratch"/supple-*.whl || return 1
   check_benchmarks "$scratch/new/bin/supple" "$scratch" || return 1
+  if [[ -x $build/bin/supple_fit ]]; then check_fit "$scratch/new/bin/supple" "$scratch" || return 1; fi
   (cd "$scratch" && env -i PATH="$scratch/new/bin:/usr/bin:/bin" sh -eu -c '
     supple run two_balls --simulate-only --frames 1-4 --progress none
     supple view out/two_balls --progress none && test -s out/two_balls/two_balls_view.html

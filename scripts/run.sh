@@ -40,10 +40,10 @@ if ((own_folder == 1)); then
 fi
 
 install_packages build run
-tests=()
-# The first build is without tests; later builds keep the configuration of the folder.
-[[ -f $supple_root/build/release/CMakeCache.txt ]] || tests=(-DSUPPLE_BUILD_TESTS=OFF)
-part "build (release)" "$supple_root/build/logs/run_build.log" configure_and_build release supple_tool "${tests[@]}" || exit 1
+options=()
+# The first build is without tests and CGAL, whose templates take two minutes; later builds keep the configuration of the folder.
+[[ -f $supple_root/build/release/CMakeCache.txt ]] || options=(-DSUPPLE_BUILD_TESTS=OFF -DSUPPLE_CGAL=OFF)
+part "build (release)" "$supple_root/build/logs/run_build.log" configure_and_build release supple_tool "${options[@]}" || exit 1
 
 printf '%-34s %s\n' "simulate and render" "$scene"
 # The tool ends by naming the frames, the film and the result.

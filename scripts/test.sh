@@ -31,7 +31,7 @@ install_packages build run test python
 
 part "planted defects have places" "$logs/mutate_check.log" "$here/mutate.sh" --check || true
 part "names in files built together" "$logs/together.log" "$here/together.py" || true
-if part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_UNITY_BUILD=ON \
+if part "build (release)" "$logs/build_release.log" configure_and_build release all -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_CGAL=ON -DSUPPLE_UNITY_BUILD=ON \
   -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3; then
   part "tests (release)" "$logs/tests_release.log" run_tests release || true
   part "installed package" "$logs/package.log" check_package "$supple_root/build/release" || true

@@ -84,7 +84,7 @@ def sources(module: str) -> list:
     if module.startswith("tests/"):
         return sorted(str(f.relative_to(ROOT / module)) for f in (ROOT / module).rglob("*_test.cpp"))
     folder = ROOT / module / "src"
-    files = sorted(f for f in folder.rglob("*.cpp") if f.parent.name != "path")  # compiled by options of its own
+    files = sorted(f for f in folder.rglob("*.cpp") if f.parent.name not in ("path", "fit"))  # compiled by options of their own
     return [str(f.relative_to(ROOT / module)) for f in files]
 
 

@@ -36,6 +36,7 @@ pack_build() {
   folder=$(echo "$work"/content/supple-*)
   info=$(echo "$folder"/supple-*.dist-info)
   cmake --build "$build" --target benchmarks >/dev/null
+  if cmake --build "$build" --target help | grep -q supple_fit_program; then cmake --build "$build" --target supple_fit_program >/dev/null; fi
   cmake --install "$build" --component wheel --prefix "$folder" --strip >/dev/null
   mkdir -p "${info%.dist-info}.data/scripts"
   cp "$root/scenes/python/command/supple" "${info%.dist-info}.data/scripts/"
@@ -46,10 +47,10 @@ pack_build() {
   if [[ $(PYTHONPATH=$build/python "$(build_python)" -c 'import supple._supple as s; print(s._numpy_versions)') == 1 ]]; then
     sed -i 's/^Requires-Dist: numpy>=1.21$/Requires-Dist: numpy<2,>=1.21/' "$info/METADATA"
   fi
-  cgal=$(ldd "$folder/supple/bin/supple" | grep -c libmpfr || true)
+  cgal=$(ldd "$folder"/supple/bin/supple* | grep -c libmpfr || true)
   if ((cgal > 0)); then
     sed -i 's/^License-Expression: .*/License-Expression: Apache-2.0 AND GPL-3.0-or-later/' "$info/METADATA"
-    echo "note: the tool of this build links CGAL, so it is under the GPL; the metadata of the wheel says so"
+    echo "note: programs of this build link CGAL, so they are under the GPL; the metadata of the wheel says so"
   fi
   "$tools/bin/python" -m wheel pack --dest-dir "$work/whole" "$folder" >/dev/null
 }

@@ -1,15 +1,12 @@
 #include "benchmarks.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <string_view>
 #include <vector>
 
+#include "installed_program.h"
 #include "supple/core/error.h"
 
 namespace supple::tool {
@@ -43,14 +40,8 @@ constexpr std::array<Group, 15> kGroups{{
     {"render", "render_bench", "pictures: gl (1280 x 720, 200,000 triangles), path (640 x 360, to a given noise)", true},
 }};
 
-/// The program of all benchmarks: beside the tool in a build and in the Python package, in libexec/supple where installed. Empty: none.
-fs::path benchmark_program() {
-  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
-  for (const fs::path& program : {folder / "supple_bench", folder.parent_path() / "libexec/supple/supple_bench"}) {
-    if (fs::exists(program)) return program;
-  }
-  return {};
-}
+/// The program of all benchmarks. Empty: none.
+fs::path benchmark_program() { return installed_program("supple_bench"); }
 
 }  // namespace
 
@@ -90,14 +81,10 @@ void run_benchmark(const std::string& group, std::span<const std::string> argume
                                      .found = "none",
                                      .hint = "in a source tree: cmake --build build/release --target benchmarks"});
   }
-  std::vector<std::string> words{program.string(), std::string(found->program)};
+  std::vector<std::string> words{std::string(found->program)};
   if (group.size() > found->name.size()) words.push_back(group.substr(found->name.size() + 1));
   words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  execv(program.c_str(), argv.data());
-  throw Error(ErrorKind::Io, Fault{.place = program.string(), .key = {}, .expected = "cannot be started: " + std::string(std::strerror(errno)), .found = {}, .hint = {}});
+  become_program(program, std::move(words));
 }
 
 }  // namespace supple::tool

@@ -1,21 +1,17 @@
 #include "fit.h"
 
+#include <algorithm>
 #include <charconv>
 #include <filesystem>
-#include <iostream>
 #include <optional>
+#include <string_view>
+#include <vector>
 
-#include "print.h"
+#include "installed_program.h"
 #include "supple/core/error.h"
-#ifdef SUPPLE_HAS_FIT
-#include "supple/core/io/atomic_file.h"
-#include "supple/fit/fit.h"
-#endif
 
 namespace supple::tool {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// 0.01 or 1%.
 std::optional<double> share_in(const std::string& text) {
@@ -26,52 +22,42 @@ std::optional<double> share_in(const std::string& text) {
   return rest.empty() ? value : 0.01 * value;
 }
 
-#ifdef SUPPLE_HAS_FIT
-#endif
-
 }  // namespace
 
 CLI::App* add_fit(CLI::App& app, FitArguments& a) {
-  CLI::App* verb = app.add_subcommand("fit", "make an object for scenes from a closed triangle mesh");
-  verb->add_option("input", a.input, "mesh: .ply, .obj, .off or .stl, in metres")->required();
-  verb->add_option("-o,--out", a.out, "file of the object (.yaml); its report is written beside it (.json)")->required();
-  verb->add_option_function<std::string>("--error", [&a](const std::string& text) { a.error = share_in(text).value_or(0.0); },
-                                         "largest distance between the surfaces, as a share of the diagonal of the data's box (default: 1%)")
-      ->check([](const std::string& text) { return share_in(text) ? std::string() : "expected a share such as 1% or 0.01, found " + text; });
-  verb->add_option("--particles", a.particles, "number of particles (default: 200)");
-  verb->add_option("--primitives", a.primitives, "largest number of primitives of the skeleton (default: 2000)");
-  verb->add_option("--pieces", a.pieces, "data of several pieces: refuse (default) or largest")->check(CLI::IsMember({"refuse", "largest"}));
-  verb->add_option("--threads", a.threads, "number of threads (default: all); does not change the result")->check(CLI::Range(0, 1024));
-  verb->add_flag("--overwrite", a.overwrite, "replace an earlier object");
-  verb->add_flag("--quiet", a.quiet, "print warnings and errors only");
-  verb->footer("Example: supple fit bunny.off -o bunny.yaml --error 2% --particles 300");
+  CLI::App* verb = app.add_subcommand("fit", kFitMeaning);
+  add_fit_options(*verb, a);
   return verb;
 }
 
-#ifdef SUPPLE_HAS_FIT
-int fit(const FitArguments& a) {
-  const fs::path out = a.out, report = fs::path(a.out).replace_extension(".json");
-  if (out.extension() != ".yaml") throw Error(ErrorKind::Usage, Fault{.place = "--out", .key = {}, .expected = "expected a file name that ends in .yaml", .found = '\'' + a.out + '\'', .hint = {}});
-  for (const fs::path& path : {out, report}) {
-    if (!a.overwrite && fs::exists(path)) throw Error(ErrorKind::Usage, Fault{.place = path.string(), .key = {}, .expected = "exists", .found = {}, .hint = "replace it by --overwrite"});
+void add_fit_options(CLI::App& verb, FitArguments& a) {
+  verb.add_option("input", a.input, "mesh: .ply, .obj, .off or .stl, in metres")->required();
+  verb.add_option("-o,--out", a.out, "file of the object (.yaml); its report is written beside it (.json)")->required();
+  verb.add_option_function<std::string>("--error", [&a](const std::string& text) { a.error = share_in(text).value_or(0.0); },
+                                         "largest distance between the surfaces, as a share of the diagonal of the data's box (default: 1%)")
+      ->check([](const std::string& text) { return share_in(text) ? std::string() : "expected a share such as 1% or 0.01, found " + text; });
+  verb.add_option("--particles", a.particles, "number of particles (default: 200)");
+  verb.add_option("--primitives", a.primitives, "largest number of primitives of the skeleton (default: 2000)");
+  verb.add_option("--pieces", a.pieces, "data of several pieces: refuse (default) or largest")->check(CLI::IsMember({"refuse", "largest"}));
+  verb.add_option("--threads", a.threads, "number of threads (default: all); does not change the result")->check(CLI::Range(0, 1024));
+  verb.add_flag("--overwrite", a.overwrite, "replace an earlier object");
+  verb.add_flag("--quiet", a.quiet, "print warnings and errors only");
+  verb.footer("Example: supple fit bunny.off -o bunny.yaml --error 2% --particles 300");
+}
+
+void start_fit(std::span<char* const> words, bool silent) {
+  const std::filesystem::path program = installed_program("supple_fit");
+  if (program.empty()) {
+    throw Error(ErrorKind::Io, Fault{.place = "supple_fit",
+                                     .key = {},
+                                     .expected = "expected the program of fits beside the tool or in libexec/supple",
+                                     .found = "none",
+                                     .hint = "in a source tree: install libcgal-dev, then cmake --preset release -DSUPPLE_CGAL=ON && cmake --build build/release --target supple_fit_program"});
   }
-  const fit::FittedObject object = fit::fit(a.input, {.error = a.error,
-                                                      .particles = a.particles,
-                                                      .primitives = a.primitives,
-                                                      .pieces = a.pieces == "largest" ? fit::Pieces::Largest : fit::Pieces::Refuse,
-                                                      .threads = a.threads});
-  io::write_atomically(report, fit::report_json(object.report));
-  io::write_atomically(out, fit::object_text(object, fs::path(a.input).filename().string()));
-  for (const std::string& warning : object.report.warnings) print(std::cerr, "warning: %s\n", warning.c_str());
-  if (a.quiet) return 0;
-  std::cout << fit::report_text(object.report);
-  print(std::cout, "object:     %s, for a scene: objects: [{name: %s, include: %s, particles: {at: [0, 0, 1]}, scale: 1, material: jelly}]\n", a.out.c_str(), out.stem().c_str(), out.filename().c_str());
-  return 0;
+  const auto verb = std::find(words.begin() + 1, words.end(), std::string_view("fit"));
+  std::vector<std::string> own(verb + 1, words.end());
+  if (silent) own.insert(own.begin(), "--quiet");
+  become_program(program, std::move(own));
 }
-#else
-int fit(const FitArguments& /*a*/) {
-  throw Error(ErrorKind::Usage, Fault{.place = "supple fit", .key = {}, .expected = "needs CGAL, without which this program was built", .found = {}, .hint = "install libcgal-dev and build it again"});
-}
-#endif
 
 }  // namespace supple::tool

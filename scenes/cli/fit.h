@@ -1,9 +1,10 @@
 /// @file fit.h
-/// `supple fit`.
+/// `supple fit`: its options, and the start of its program. That is a program of its own, as it links CGAL and is built on request.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <span>
 #include <string>
 
 namespace supple::tool {
@@ -17,10 +18,15 @@ struct FitArguments {
   bool overwrite = false, quiet = false;
 };
 
+inline constexpr const char* kFitMeaning = "make an object for scenes from a closed triangle mesh";
+
 /// Adds the command with its options.
 CLI::App* add_fit(CLI::App& app, FitArguments& arguments);
+/// The options alone.
+void add_fit_options(CLI::App& verb, FitArguments& arguments);
 
-/// @return the exit code
-int fit(const FitArguments& arguments);
+/// Replaces this process by the program of fits. @param words  the command line   @param silent  standard output is closed
+/// @throws Error{Io} where the program is not built
+[[noreturn]] void start_fit(std::span<char* const> words, bool silent);
 
 }  // namespace supple::tool

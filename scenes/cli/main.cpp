@@ -1,18 +1,12 @@
 /// The command line tool: parses arguments, calls the library, prints. It has no functions beyond the library.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <atomic>
 #include <charconv>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <limits>
-#include <new>
 #include <optional>
 #include <span>
 #include <sstream>
@@ -23,9 +17,9 @@
 #include "describe.h"
 #include "fit.h"
 #include "job.h"
-#include "last_resort.h"
 #include "library.h"
 #include "print.h"
+#include "program.h"
 #include "progress_bar.h"
 #include "supple/core/counted.h"
 #include "sweep.h"
@@ -35,8 +29,6 @@
 #include "view_server.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
-#include "supple/core/interrupt.h"
-#include "supple/core/io/descriptor.h"
 #include "supple/scenes/check.h"
 #include "supple/scenes/estimate.h"
 #include "supple/scenes/gltf.h"
@@ -54,34 +46,16 @@
 namespace {
 
 using namespace supple;
+using tool::interrupted;
 using tool::print;
 namespace fs = std::filesystem;
 
 constexpr int kUsage = 2;
-constexpr int kInternal = 1;
-constexpr int kSignalExit = 128;
 
 constexpr const char* kFilmRule =
     "A film and a contact sheet contain only pictures drawn by the same build with the same keys. The film is made if all frames from\n"
     "1 to the last simulated one have such a picture. Otherwise there is no film, an earlier film of other pictures is removed, and a\n"
     "warning names the frames.\n\n";
-
-std::atomic<int> interrupted{0};
-
-/// The first signal ends the run between two steps, a second one ends the program.
-void on_signal(int number) {
-  interrupted = number;
-  std::signal(number, SIG_DFL);
-}
-
-void ignore(int /*number*/) {}
-
-/// From the start of the program on. A handler instead of SIG_IGN for pipes that are closed at the other end, as programs that are started would inherit that.
-void heed_signals() {
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
-  std::signal(SIGPIPE, ignore);
-}
 
 struct Arguments {
   std::string scene;
@@ -484,7 +458,6 @@ int parse_and_call(int argc, char** argv, bool silent) {
   CLI::App* sweep_verb = tool::add_sweep(app, sweep_arguments);
 
   tool::FitArguments fit_arguments;
-  fit_arguments.quiet = silent;
   CLI::App* fit_verb = tool::add_fit(app, fit_arguments);
 
   tool::JobArguments job_arguments;
@@ -572,19 +545,10 @@ int parse_and_call(int argc, char** argv, bool silent) {
     return kUsage;
   }
   a.words = bench_verb->remaining();
-  if (view_verb->parsed()) {
-    heed_signals();
-    return tool::view(view_arguments, interrupted);
-  }
-  if (fit_verb->parsed()) {
-    heed_signals();
-    return tool::fit(fit_arguments);
-  }
+  if (view_verb->parsed()) return tool::view(view_arguments, interrupted);
+  if (fit_verb->parsed()) tool::start_fit(std::span(argv, static_cast<std::size_t>(argc)), silent);
   if (job_verb->parsed()) return tool::write_job(job_arguments);
-  if (sweep_verb->parsed()) {
-    heed_signals();
-    return tool::sweep(sweep_arguments, simulation_options(0).delaunay, interrupted);
-  }
+  if (sweep_verb->parsed()) return tool::sweep(sweep_arguments, simulation_options(0).delaunay, interrupted);
   if (scenes_verb->parsed()) {
     std::cout << tool::list_library();
     return 0;
@@ -619,52 +583,6 @@ int parse_and_call(int argc, char** argv, bool silent) {
   return query(a);
 }
 
-/// @throws Error{Io} where the output could not be written
-void flush_output() {
-  if (std::cout.flush().good()) return;
-  throw Error(ErrorKind::Io, Fault{.place = "standard output", .key = {}, .expected = "cannot be written", .found = {}, .hint = {}});
-}
-
-/// @param silent  standard output is closed   @return the exit code
-int call(int argc, char** argv, bool silent) {
-  try {
-    const InterruptScope scope(&interrupted);
-    const int code = parse_and_call(argc, argv, silent);
-    flush_output();
-    return code;
-  } catch (const supple::Error& error) {
-    std::cout.flush();
-    std::cerr << error.what() << '\n';
-    return static_cast<int>(error.kind());
-  } catch (const supple::Interrupted&) {
-    std::cerr << "interrupted by signal " << interrupted << '\n';
-    return kSignalExit + interrupted;
-  } catch (const std::filesystem::filesystem_error& error) {
-    std::cerr << tool::printable_lines(error.what()) << '\n';
-    return static_cast<int>(supple::ErrorKind::Io);
-  } catch (const std::bad_alloc&) {
-    std::cerr << supple::scenes::kOutOfMemory << '\n';
-    return static_cast<int>(supple::ErrorKind::Limit);
-  } catch (const std::exception& error) {
-    std::cerr << "internal fault: " << error.what() << '\n';
-    return kInternal;
-  }
-}
-
 }  // namespace
 
-int main(int argc, char** argv) {
-  heed_signals();
-  // Before any file is opened: it would get the number of a closed standard stream, and the text that is printed there.
-  const bool silent = supple::io::occupy_standard_descriptors()[STDOUT_FILENO];
-  std::signal(SIGCHLD, SIG_DFL);  // our parent may ignore it, which hides how ffmpeg ends
-  std::ios::sync_with_stdio(false);
-  supple::tool::prepare_last_resort();
-  const int code = call(argc, argv, silent);
-  // After running out of memory, arrays of Eigen may hold freed memory: data of threads is not destroyed.
-  if (code == static_cast<int>(supple::ErrorKind::Limit)) {
-    std::cout.flush();
-    std::_Exit(code);
-  }
-  return code;
-}
+int main(int argc, char** argv) { return supple::tool::run_program(argc, argv, parse_and_call); }

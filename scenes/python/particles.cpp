@@ -60,6 +60,16 @@ void set_particles(Handle& handle, const py::object& position, const py::object&
   handle.use([&](scenes::Simulation& simulation) { simulation.set_particles(change); });
 }
 
+void set_loads(Handle& handle, const py::object& force, const py::object& torque) {
+  core::Loads loads;
+  if (!force.is_none()) loads.force = rows3(force, "force");
+  if (!torque.is_none()) loads.torque = rows3(torque, "torque");
+  if (force.is_none() != torque.is_none()) {
+    (force.is_none() ? loads.force : loads.torque).assign(std::max(loads.force.size(), loads.torque.size()), Vec3::Zero());
+  }
+  handle.use([&](scenes::Simulation& simulation) { simulation.set_loads(loads); });
+}
+
 }  // namespace
 
 std::vector<Vec3> rows3(const py::object& values, const char* argument) {
@@ -117,7 +127,11 @@ void bind_particles(py::module_& module, Simulation& simulation) {
            "orientations are normalised, angular_velocity may replace angular_momentum, and what pins hold "
            "keeps no velocity.\n\n"
            "Changes of momentum, angular momentum and energy are booked in the ledger as external, so that the "
-           "audits stay valid.");
+           "audits stay valid.")
+      .def("set_loads", &set_loads, py::arg("force") = py::none(), py::arg("torque") = py::none(),
+           "Sets forces [N] and torques [N m] on all particles, world axes, shape (n, 3), that act besides those of the scene from now on;\n"
+           "without arguments none. For forces that change, call it before each step(). They are external loads: the ledger has their work\n"
+           "and impulse. They are no part of the state: after restore() they still act, and a new Simulation has none.");
 }
 
 }  // namespace supple::python

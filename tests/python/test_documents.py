@@ -39,7 +39,7 @@ class EmbeddingPage(unittest.TestCase):
 class PythonPage(unittest.TestCase):
     def test_has_examples_that_run(self):
         examples = re.findall(r"```python\n(.*?)```", (SOURCE / "docs/python.md").read_text(), re.DOTALL)
-        self.assertEqual(len(examples), 5)
+        self.assertEqual(len(examples), 6)
         for example in examples:
             self.assertTrue(output_of(example, "docs/python.md") or "assert" in example)
 

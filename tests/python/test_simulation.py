@@ -12,6 +12,17 @@ from support import TOOL, library, run_tool, two_drops
 
 
 class Simulations(unittest.TestCase):
+    def test_take_forces_in_each_step(self):
+        simulation = supple.Simulation(two_drops())
+        simulation.set_loads(force=[[0, 0, 1]] * len(simulation.particles))
+        simulation.step()
+        pushed = simulation.ledger().external_impulse
+        simulation.set_loads()
+        simulation.step()
+        np.testing.assert_allclose(simulation.ledger().external_impulse - pushed, pushed - len(simulation.particles) * simulation.time_step * np.array([0, 0, 1]), atol=1e-9)
+        with self.assertRaisesRegex(supple.Error, "one per particle"):
+            simulation.set_loads(torque=[[0, 0, 1]])
+
     def test_count_frames_and_time(self):
         simulation = supple.Simulation(two_drops())
         self.assertEqual((simulation.frame, simulation.time), (1, 0.0))

@@ -11,10 +11,10 @@ import urllib.request
 import numpy as np
 
 import supple
+from browser import BROWSER, OPTIONS, Browser
 from support import LIBRARY, TOOL, two_drops
 from view_page import read_frames, read_page
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 TITLE = "Two drops </script><b> & \"quotes\""
 
 
@@ -26,9 +26,8 @@ def run_of(scene, folder):
 def browse(page, *arguments, size="1000,640"):
     """Calls the browser without a window; its output as text."""
     with tempfile.TemporaryDirectory() as profile:
-        done = subprocess.run([BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-                               "--hide-scrollbars", f"--user-data-dir={profile}", f"--window-size={size}", "--virtual-time-budget=30000",
-                               "--disable-background-networking", *arguments, page], capture_output=True, text=True, timeout=100)
+        done = subprocess.run([BROWSER, *OPTIONS, f"--user-data-dir={profile}", f"--window-size={size}", "--virtual-time-budget=30000",
+                               *arguments, page], capture_output=True, text=True, timeout=100)
     return done.stdout
 
 
@@ -123,6 +122,29 @@ class ViewPage(unittest.TestCase):
         self.assertIn('data-frame="5"', text)
         self.assertIn(f'data-ready="{len(self.frames)}"', text)
         self.assertNotIn("This page cannot be shown", text.split("<script>")[0])
+
+    @unittest.skipUnless(BROWSER, "no browser (apt-get install chromium)")
+    def test_is_scrubbed_by_mouse_and_keys(self):
+        last = len(self.frames)
+        with Browser(f"file://{self.page}") as page:
+            page.wait(f"document.body && document.body.dataset.ready == '{last}'")
+
+            def frame():
+                return int(page.value("document.body.dataset.frame"))
+
+            shown = [frame() for _ in page.drag("#scrub", [0.02, 0.3, 0.5, 0.7, 0.98])]
+            self.assertEqual((shown[0], shown[-1]), (1, last))
+            self.assertEqual(shown, sorted(set(shown)))
+            end = page.picture()
+            back = [frame() for _ in page.drag("#plots canvas", [0.99, 0.6, 0.02])]  # the first plot
+            self.assertEqual((back[0], back[-1]), (last, 1))
+            self.assertGreater(back[0], back[1])
+            self.assertGreater(back[1], back[2])
+            self.assertNotEqual(page.picture(), end)
+            page.press("End")
+            self.assertEqual(frame(), last)
+            page.press("ArrowLeft")
+            self.assertEqual(frame(), last - 1)
 
 
 class FollowedRun(unittest.TestCase):

@@ -112,13 +112,19 @@ ln "$supple" bin/supple 2> err.txt || cp "$supple" bin/supple
 bin/supple bench core 2> err.txt
 [[ $? == 4 ]] && grep -qF 'libexec/supple' err.txt || fault "bench core without its program: $(cat err.txt)"
 bin/supple bench --list | grep -q 'core/stability  *not built' || fault 'bench --list: expected no programs'
+bin/supple fit data.off -o data.yaml 2> err.txt
+[[ $? == 4 ]] && grep -qF -- '--target supple_fit_program' err.txt || fault "fit without its program: $(cat err.txt)"
+expect 2 '--out is required' fit data.off
+expect 2 'expected a share such as 1% or 0.01, found much' fit data.off -o data.yaml --error much
 for folder in bin libexec/supple; do
   mkdir -p "$folder"
   printf '#!/bin/sh\necho "$@"\n' > "$folder/supple_bench"
   chmod +x "$folder/supple_bench"
   [[ $(bin/supple bench collision/stability --seed 7 map.svg) == 'contact_stress --seed 7 map.svg' ]] || fault 'bench collision/stability --seed 7 map.svg: expected these words for its program'
   bin/supple bench --list | grep -q 'core/stability  *built' || fault 'bench --list: expected programs'
-  rm "$folder/supple_bench"
+  mv "$folder/supple_bench" "$folder/supple_fit"
+  [[ $(bin/supple fit fit --out 'an object.yaml' --error 2%) == 'fit --out an object.yaml --error 2%' ]] || fault 'fit fit --out an object.yaml: expected these words for its program'
+  rm "$folder/supple_fit"
 done
 expect 5 'diverged at step' run diverges.yaml --out diverged --progress none
 expect 6 'time_step.max_substeps' run too_fine.yaml --out fine --progress none

@@ -271,7 +271,7 @@ void freeze(const StepProblem& problem, double time, const ParticleState& at, co
 }
 
 /// The pose of least potential of three: free flight; the start, where bonds are stiff; the start moved on by its velocities, where bodies rest on others.
-void guess(const ParticleSet& set, double h, const StepPotential& potential, ImplicitBuffers& buffers) {
+void guess(const StepProblem& problem, double time, double h, const StepPotential& potential, ImplicitBuffers& buffers) {
   buffers.pose = buffers.flight;
   double least = potential.value(buffers.flight);
   const auto offer = [&](const ParticleState& pose) {
@@ -280,11 +280,14 @@ void guess(const ParticleSet& set, double h, const StepPotential& potential, Imp
     least = value;
     buffers.pose = pose;
   };
-  offer(buffers.start);
+  buffers.trial = buffers.start;
+  place_led(problem, time, buffers.trial);
+  offer(buffers.trial);
   if (buffers.contact.empty()) return;
   Loads none;
-  none.reset(set.size());
-  fly(set, buffers.start, none, h, buffers.trial);
+  none.reset(problem.set.size());
+  fly(problem.set, buffers.start, none, h, buffers.trial);
+  place_led(problem, time, buffers.trial);
   offer(buffers.trial);
 }
 
@@ -355,17 +358,19 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   target.kick.valid = false;
   StepReport report{.substeps = 1, .force_evaluations = 1};
 
-  stop_pinned(set, state);
+  begin_pins(problem, time, dt, target);
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
 
   if (midpoint) {
     buffers.frozen.reset(n);
     fly(set, state, buffers.frozen, h, buffers.pose);
+    place_led(problem, time + h, buffers.pose);
     freeze(problem, time + h, buffers.pose, tools, buffers);
   } else {
     freeze(problem, time + h, state, tools, buffers);
   }
   fly(set, state, buffers.frozen, h, buffers.flight);
+  place_led(problem, time + h, buffers.flight);
 
   buffers.points.clear();
   if (problem.contact != nullptr) problem.contact->find(buffers.flight, time + h, buffers.points);
@@ -376,7 +381,7 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   buffers.damping.clear();
 
   StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
-  guess(set, h, potential, buffers);
+  guess(problem, time + h, h, potential, buffers);
   buffers.damping.begin(set, interactions, buffers.start, buffers.pose, h, midpoint);
   constexpr double kOfStickSpeed = 5e-3;  // velocities at the end of a step tell what holds to a hundredth of the friction
   minimise(settings, problem.contact != nullptr ? kOfStickSpeed * problem.contact->stick_speed : 0.0, potential, buffers, report);
@@ -400,9 +405,11 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
       if (momentum != Vec3::Zero()) rotate_free(state.orientation[i], momentum, set.inertia[i], h);
     }
   }
+  place_led(problem, time + dt, state);
   book_external_work(set, start, state, buffers.sample.external, ledger);
 
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
+  end_pins(problem, time + dt, dt, target);
   return report;
 }
 

@@ -20,11 +20,15 @@ double dissipated_by(const ParticleSet& set, const ForceSample& sample, double d
     const Vec3& f = sample.dissipative.force[i];
     const Vec3& t = sample.dissipative.torque[i];
     if (f == Vec3::Zero() && t == Vec3::Zero()) continue;
-    if (!holds_position(set, i)) {
+    if (holds_position(set, i)) {
+      work += dt * f.dot(before_kick.velocity[i]);
+    } else {
       const Vec3 force = free_translation(set.pinned[i], sample.internal.force[i] + sample.external.force[i]);
       work += dt * f.dot(before_kick.velocity[i] + 0.5 * dt / set.mass[i] * force);
     }
-    if (!holds_orientation(set, i)) {
+    if (holds_orientation(set, i)) {
+      work += dt * t.dot(angular_velocity(set, before_kick, i));
+    } else {
       const Vec3 torque = free_rotation(set.pinned[i], sample.internal.torque[i] + sample.external.torque[i]);
       const Vec3 mean = before_kick.angular_momentum[i] + 0.5 * dt * torque;
       const Quat& q = before_kick.orientation[i];
@@ -146,8 +150,11 @@ double half_work(const ParticleSet& set, RotationUpdate rotation, const Loads& e
       i += 3;
       continue;
     }
-    if (!holds_position(set, i)) work += 0.5 * dt * external.force[i].dot(state.velocity[i]);
-    if (!holds_orientation(set, i) && external.torque[i] != Vec3::Zero()) {
+    work += 0.5 * dt * external.force[i].dot(state.velocity[i]);
+    if (external.torque[i] == Vec3::Zero()) continue;
+    if (holds_orientation(set, i)) {
+      work += 0.5 * dt * external.torque[i].dot(angular_velocity(set, state, i));
+    } else {
       work += 0.5 * external.torque[i].dot(drifted_rotation(set, rotation, state, i, dt));
     }
   }
@@ -160,8 +167,8 @@ void kick_changing(const ParticleSet& set, const ForceSample& sample, double dt,
     double work = 0.0;
     for (std::size_t i = 0; i < set.size(); ++i) {
       const Vec3 &force = sample.external.force[i], &torque = sample.external.torque[i];
-      if (!holds_position(set, i)) work += 0.5 * dt * force.dot(state.velocity[i]);
-      if (!holds_orientation(set, i) && torque != Vec3::Zero()) work += 0.5 * dt * torque.dot(angular_velocity(set, state, i));
+      work += 0.5 * dt * force.dot(state.velocity[i]);
+      if (torque != Vec3::Zero()) work += 0.5 * dt * torque.dot(angular_velocity(set, state, i));
     }
     return work;
   };
@@ -192,14 +199,82 @@ void hash_vector(const Vec3& v, Hasher& hasher) {
   for (int k = 0; k < 3; ++k) hasher.add(v[k]);
 }
 
+/// What is held of a particle that a pin leads; 0: nothing.
+std::uint8_t led_by(const ParticleSet& set, const LedPin& pin) { return set.pinned[pin.particle] & pin.pins; }
+
+double turning_energy(const ParticleSet& set, const ParticleState& state, std::size_t i) {
+  return 0.5 * state.angular_momentum[i].dot(angular_velocity(set, state, i));
+}
+
+Vec3 momentum_of(const ParticleSet& set, std::size_t i, const Quat& q, const Vec3& spin) {
+  return q * set.inertia[i].cwiseProduct(q.conjugate() * spin);
+}
+
+/// The pin changes a velocity and an angular momentum; it gives the energy and the momentum.
+void push_led(const ParticleSet& set, std::size_t i, const Vec3& velocity, const Vec3& momentum, const StepTarget& target) {
+  auto& [state, kick_state, ledger] = target;
+  const double turning = turning_energy(set, state, i);
+  const Vec3 gained = set.mass[i] * (velocity - state.velocity[i]);
+  ledger.external_work += 0.5 * gained.dot(velocity + state.velocity[i]);
+  ledger.pin_impulse += gained;
+  ledger.pin_angular_impulse += state.position[i].cross(gained) + (momentum - state.angular_momentum[i]);
+  state.velocity[i] = velocity;
+  state.angular_momentum[i] = momentum;
+  ledger.external_work += turning_energy(set, state, i) - turning;
+}
+
 }  // namespace
 
-void stop_pinned(const ParticleSet& set, ParticleState& state) {
+void begin_pins(const StepProblem& problem, double time, double dt, const StepTarget& target) {
+  const ParticleSet& set = problem.set;
+  ParticleState& state = target.state;
+  auto next = problem.led.begin();
   for (std::size_t i = 0; i < set.size(); ++i) {
-    if (set.pinned[i] == 0) continue;
-    state.velocity[i] = free_translation(set.pinned[i], state.velocity[i]);
-    state.angular_momentum[i] = free_rotation(set.pinned[i], state.angular_momentum[i]);
+    std::uint8_t still = set.pinned[i];
+    if (next != problem.led.end() && next->particle == i) still &= static_cast<std::uint8_t>(~led_by(set, *next++));
+    if (still == 0) continue;
+    state.velocity[i] = free_translation(still, state.velocity[i]);
+    state.angular_momentum[i] = free_rotation(still, state.angular_momentum[i]);
   }
+  for (const LedPin& pin : problem.led) {
+    const std::uint8_t led = led_by(set, pin);
+    if (led == 0) continue;
+    const std::size_t i = pin.particle;
+    const Pose end = pin.place(time + dt);
+    Vec3 velocity = state.velocity[i], momentum = state.angular_momentum[i];
+    if ((led & kPinPosition) != 0) velocity = 1.0 / dt * (end.position - state.position[i]);
+    if ((led & kPinOrientation) != 0) {
+      const Vec3 spin = 1.0 / dt * rotation_log(end.orientation * state.orientation[i].conjugate());
+      momentum = momentum_of(set, i, state.orientation[i], spin);
+    }
+    push_led(set, i, velocity, momentum, target);
+  }
+}
+
+void place_led(const StepProblem& problem, double time, ParticleState& state) {
+  for (const LedPin& pin : problem.led) {
+    const std::uint8_t led = led_by(problem.set, pin);
+    if (led == 0) continue;
+    const Pose pose = pin.place(time);
+    if ((led & kPinPosition) != 0) state.position[pin.particle] = pose.position;
+    if ((led & kPinOrientation) != 0) state.orientation[pin.particle] = pose.orientation;
+  }
+}
+
+void end_pins(const StepProblem& problem, double end, double dt, const StepTarget& target) {
+  const ParticleSet& set = problem.set;
+  ParticleState& state = target.state;
+  for (const LedPin& pin : problem.led) {
+    if ((led_by(set, pin) & kPinOrientation) == 0) continue;
+    const std::size_t i = pin.particle;
+    const Pose begin = pin.place(end - dt), now = pin.place(end);
+    const Vec3 spin = 1.0 / dt * rotation_log(now.orientation * begin.orientation.conjugate());
+    const double before = turning_energy(set, state, i);
+    state.orientation[i] = now.orientation;
+    target.ledger.external_work += turning_energy(set, state, i) - before;
+    push_led(set, i, state.velocity[i], momentum_of(set, i, now.orientation, spin), target);
+  }
+  place_led(problem, end, state);
 }
 
 void ForceSample::reset(std::size_t n) {
@@ -289,7 +364,7 @@ void advance(const StepProblem& problem, double time, double dt, const StepTarge
   const auto& [state, kick_state, ledger] = target;
   SUPPLE_EXPECTS(dt > 0.0 && state.size() == set.size());
   ForceSample& sample = kick_state.sample;
-  stop_pinned(set, state);
+  begin_pins(problem, time, dt, target);
   if (!kick_state.valid) evaluate(forces, state, time, sample);
 
   // Each kick has the mean of the external loads over its half of the step, for loads of any duration.
@@ -307,6 +382,7 @@ void advance(const StepProblem& problem, double time, double dt, const StepTarge
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Forward, state, ledger);
   (changing ? kick_changing : kick)(set, sample, 0.5 * dt, state, ledger);
   drift(set, rotation, dt, state);
+  place_led(problem, end, state);
   if (!changing) ledger.external_work += half_work(set, rotation, sample.external, state, dt);
   evaluate(forces, state, end, sample);
   kick_state.valid = true;
@@ -317,6 +393,7 @@ void advance(const StepProblem& problem, double time, double dt, const StepTarge
   apply_friction(set, interactions.friction, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_stiffness_damping(set, interactions, 0.5 * dt, PairOrder::Backward, state, ledger);
   apply_medium(set, interactions.medium, 0.5 * dt, state, ledger);
+  end_pins(problem, end, dt, target);
 }
 
 double stable_step(const StepLimits& limits) {

@@ -108,6 +108,8 @@ void evaluate_rates(const StepProblem& problem, const ParticleState& state, doub
       const Vec3 free_torque = free_rotation(set.pinned[i], torque);
       books.pin_impulse -= force - free_force;
       books.pin_angular_impulse -= x.cross(force - free_force) + (torque - free_torque);
+      if ((set.pinned[i] & kPinPosition) != 0) books.external_work -= force.dot(v);
+      if ((set.pinned[i] & kPinOrientation) != 0) books.external_work -= torque.dot(omega);
       rates.acceleration[i] = 1.0 / set.mass[i] * free_force;
       rates.torque[i] = free_torque;
     }
@@ -255,7 +257,7 @@ StepReport advance_runge_kutta(const IntegratorSettings& settings, const StepPro
                                const StepTarget& target, RungeKuttaBuffers& buffers) {
   const auto& [state, kick, ledger] = target;
   const bool adaptive = settings.method == Integrator::Adaptive;
-  stop_pinned(problem.set, state);
+  begin_pins(problem, time, dt, target);
   kick.valid = false;
   Stepper stepper(adaptive ? kPrince : kClassic, problem, buffers);
   StepReport report;
@@ -266,6 +268,7 @@ StepReport advance_runge_kutta(const IntegratorSettings& settings, const StepPro
     stepper.accept(dt, state, ledger);
     report.substeps = 1;
   }
+  end_pins(problem, time + dt, dt, target);
   report.force_evaluations = stepper.evaluations();
   return report;
 }

@@ -16,6 +16,7 @@ struct Side {
   double inverse_mass;
   double inverse_inertia;  ///< of an isotropic body
   bool isotropic;
+  bool held;               ///< turns as its pin does
 };
 
 Side side_of(const ParticleSet& set, std::size_t i) {
@@ -24,11 +25,12 @@ Side side_of(const ParticleSet& set, std::size_t i) {
   return {.index = i,
           .inverse_mass = (set.pinned[i] & kPinPosition) != 0 ? 0.0 : 1.0 / set.mass[i],
           .inverse_inertia = held ? 0.0 : 1.0 / inertia.x(),
-          .isotropic = held || (inertia.x() == inertia.y() && inertia.y() == inertia.z())};
+          .isotropic = held || (inertia.x() == inertia.y() && inertia.y() == inertia.z()),
+          .held = held};
 }
 
 Vec3 spin(const ParticleSet& set, const ParticleState& state, const Side& side) {
-  if (side.isotropic) return side.inverse_inertia * state.angular_momentum[side.index];
+  if (side.isotropic && !side.held) return side.inverse_inertia * state.angular_momentum[side.index];
   return angular_velocity(set, state, side.index);
 }
 
@@ -148,6 +150,31 @@ bool is_free_isotropic(const ParticleSet& set, std::size_t i) {
   return set.pinned[i] == 0 && inertia.x() == inertia.y() && inertia.y() == inertia.z();
 }
 
+/// Drag of a particle with a pin over dt: what a moving pin holds keeps its velocity, and the pin does the work.
+void drag_pinned(const ParticleSet& set, const MediumDamping& law, std::size_t i, double dt, ParticleState& state, Ledger& ledger) {
+  const bool held = (set.pinned[i] & kPinPosition) != 0, held_turn = (set.pinned[i] & kPinOrientation) != 0;
+  const double keep = math::exp(-law.linear * dt), keep_spin = math::exp(-law.angular * dt);
+  const Vec3 velocity = held ? state.velocity[i] : Vec3(keep * state.velocity[i]);
+  const Vec3 impulse = held ? Vec3(-law.linear * dt * set.mass[i] * velocity) : Vec3(set.mass[i] * (velocity - state.velocity[i]));
+  const Vec3 omega = angular_velocity(set, state, i);
+  const Vec3 momentum = held_turn ? state.angular_momentum[i] : Vec3(keep_spin * state.angular_momentum[i]);
+  const Vec3 angular = held_turn ? Vec3(-law.angular * dt * momentum) : Vec3(momentum - state.angular_momentum[i]);
+  ledger.dissipated -= 0.5 * impulse.dot(velocity + state.velocity[i]) + 0.5 * (held_turn ? 2.0 : 1.0 + keep_spin) * angular.dot(omega);
+  ledger.external_impulse += impulse;
+  ledger.external_angular_impulse += state.position[i].cross(impulse) + angular;
+  if (held) {
+    ledger.pin_impulse -= impulse;
+    ledger.pin_angular_impulse -= state.position[i].cross(impulse);
+    ledger.external_work -= impulse.dot(velocity);
+  }
+  if (held_turn) {
+    ledger.pin_angular_impulse -= angular;
+    ledger.external_work -= angular.dot(omega);
+  }
+  state.velocity[i] = velocity;
+  state.angular_momentum[i] = momentum;
+}
+
 }  // namespace
 
 void apply_friction(const ParticleSet& set, const std::vector<Friction>& friction, double dt, PairOrder order,
@@ -177,6 +204,10 @@ void apply_medium(const ParticleSet& set, const std::vector<MediumDamping>& medi
     const double keep_spin = math::exp(-law.angular * dt);
     for (std::size_t i = 0; i < set.size(); ++i) {
       if (set.object[i] != law.object) continue;
+      if ((set.pinned[i] & (kPinPosition | kPinOrientation)) != 0) {
+        drag_pinned(set, law, i, dt, state, ledger);
+        continue;
+      }
       const Vec3 velocity = keep * state.velocity[i];
       const Vec3 impulse = set.mass[i] * (velocity - state.velocity[i]);
       const Vec3 omega = angular_velocity(set, state, i);

@@ -6,7 +6,7 @@
 
 namespace supple::core {
 
-/// Gives particle i an impulse and an angular impulse about its centre; what a pin holds is booked as the pin's.
+/// Gives particle i an impulse and an angular impulse about its centre; what a pin holds is booked as the pin's, with the work of one that moves.
 inline void apply_impulse(const ParticleSet& set, std::size_t i, const Vec3& impulse, const Vec3& angular,
                           ParticleState& state, Ledger& ledger) {
   const double inverse_mass = 1.0 / set.mass[i];
@@ -22,6 +22,8 @@ inline void apply_impulse(const ParticleSet& set, std::size_t i, const Vec3& imp
   state.angular_momentum[i] += free_angular;
   ledger.pin_impulse -= impulse - free;
   ledger.pin_angular_impulse -= state.position[i].cross(impulse - free) + (angular - free_angular);
+  if ((pinned & kPinPosition) != 0) ledger.external_work -= impulse.dot(state.velocity[i]);
+  if ((pinned & kPinOrientation) != 0) ledger.external_work -= angular.dot(angular_velocity(set, state, i));
 }
 
 /// The order in which the pairs are visited: the second half step mirrors the first.

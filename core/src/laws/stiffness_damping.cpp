@@ -88,6 +88,18 @@ Mat12 mass_root(const ParticleSet& set, const ParticleState& state, std::size_t 
   return root;
 }
 
+/// Velocities that pins of a pair prescribe; zero of what is free.
+Vec12 led_velocities(const ParticleSet& set, const Vec12& motion, std::size_t a, std::size_t b) {
+  Vec12 led = Vec12::Zero();
+  int at = 0;
+  for (const std::size_t i : {a, b}) {
+    if ((set.pinned[i] & kPinPosition) != 0) led.segment<3>(at) = motion.segment<3>(at);
+    if ((set.pinned[i] & kPinOrientation) != 0) led.segment<3>(at + 3) = motion.segment<3>(at + 3);
+    at += 6;
+  }
+  return led;
+}
+
 struct DampedPair {
   std::uint32_t a, b;
   PairHessian hessian;
@@ -98,17 +110,24 @@ void damp(const ParticleSet& set, const DampedPair& pair, double h, ParticleStat
   const Vec3 r = state.position[b] - state.position[a];
   const Mat12 k = deformation_stiffness(r, hessian);
   const Mat12 light = mass_root(set, state, a, b, true);
-  const Vec12 before = mass_root(set, state, a, b, false) * velocities(set, state, a, b);
+  const Vec12 motion = velocities(set, state, a, b);
+  const Vec12 before = mass_root(set, state, a, b, false) * motion;
+  const Vec12 led = led_velocities(set, motion, a, b);
   // y' = -Z y / h in y = M^(1/2) velocity, to second order as in friction.
   const Mat12 z = h * light * k * light;
   const Mat12 one = Mat12::Identity();
-  const Vec12 mean = (one + z + 0.5 * z * z).llt().solve(before + 0.5 * z * before);
-  const Vec12 impulse = -h * k * (light * mean);
+  Vec12 drive = before + 0.5 * z * before;
+  if (!led.isZero(0.0)) {
+    const Vec12 push = -h * light * (k * led);  // with y' = -(Z y - push) / h: the mean has (exp(-Z) - 1 + Z) / Z^2 of it
+    drive += 0.5 * (push + z * push);
+  }
+  const Vec12 mean = (one + z + 0.5 * z * z).llt().solve(drive);
+  const Vec12 impulse = led.isZero(0.0) ? Vec12(-h * k * (light * mean)) : Vec12(-h * k * (light * mean + led));
   const Balanced balanced = balance(r, impulse);
   apply_impulse(set, a, -balanced.force_b, balanced.torque_a, state, ledger);
   apply_impulse(set, b, balanced.force_b, balanced.torque_b, state, ledger);
   const Vec12 gain = light * impulse;
-  ledger.dissipated -= gain.dot(before) + 0.5 * gain.squaredNorm();
+  ledger.dissipated -= gain.dot(before) + 0.5 * gain.squaredNorm() + impulse.dot(led);
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 #include "file/scene_places.h"
 #include "model/arrangement.h"
 #include "model/model_laws.h"
-#include "output/frame_looks.h"
-#include "output/output_files.h"
+#include "output/files/output_files.h"
+#include "output/pictures/frame_looks.h"
 #include "supple/core/pair_laws.h"
 #include "supple/scenes/limits.h"
 

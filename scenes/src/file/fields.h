@@ -27,7 +27,7 @@
 #include "file/fields_rules.h"
 #include "file/fields_shapes.h"
 #include "file/read_scene_faults.h"
-#include "output/camera.h"
+#include "output/pictures/camera.h"
 #include "supple/core/math.h"
 
 namespace supple::scenes {

@@ -43,9 +43,13 @@ template <class Archive>
 void fields(Archive& archive, PairDesc& d) {
   archive.required("objects", d.objects, identifier().items(2, 2), "names of two objects or obstacles; 'ground' stands for the ground");
   archive("collide", d.collide, {}, "whether the two can touch");
+  archive("from", d.from, at_least(0.0, kTime), "time from which the two can touch; what overlaps then is pushed apart, by external work");
+  archive("until", d.until, above(0.0, kTime), "time from which they pass through each other; absent: never");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient, instead of sqrt(mu_A mu_B)");
   archive("dissipation", d.dissipation, at_least(0.0, kInverseSpeed), "damping d, instead of that of the materials");
   archive("restitution", d.restitution, {}, "rebound speed, instead of dissipation");
+  archive.check(d.until > d.from, "until", "expected more than from = " + number_text(d.from) + " [s]", number_text(d.until), "");
+  archive.check(d.collide.value_or(true) || !(archive.given("from") || archive.given("until")), "collide", "expected two that can touch between times", "collide: false", "");
   archive.check(!(d.dissipation && d.restitution), "restitution", "expected either dissipation or restitution", "both", "");
   if (d.objects.size() == 2) {
     archive.check(d.objects[0] != d.objects[1], "objects", "expected two different objects", '\'' + shown(d.objects[0]) + "' twice", "");
@@ -125,6 +129,7 @@ void fields(Archive& archive, ObstacleDesc& d) {
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");
   archive("texture", d.texture, {}, "pattern along the obstacle's own axes, from 'at'; absent: none");
+  archive("smooth_deg", d.smooth, only(degrees(0.0, 180.0), {ObstacleName::Mesh}), "pictures show edges whose faces differ by less than this angle smooth; 0: all are sharp");
   archive("visible", d.visible, {}, "whether it is drawn");
   archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is P times slope times depth; of an implicit obstacle P (f - iso)");
   archive("slope", d.slope, only(above(0.0, kSlope), {Plane, Box, Heights, ObstacleName::Mesh}), "of its field");

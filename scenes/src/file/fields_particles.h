@@ -140,11 +140,49 @@ void fields(Archive& archive, CutDesc& d) {
 }
 
 template <class Archive>
+void fields(Archive& archive, PinKeyDesc& d) {
+  archive.required("time", d.time, at_least(0.0, kTime), "time at which the particle is there");
+  archive("by", d.by, any(kLength), "away from its place at the start");
+  archive("turn_deg", d.turn, degrees(-36000.0, 36000.0), "rotation about turn_axis");
+}
+
+template <class Archive>
+void fields(Archive& archive, PinMotionDesc& d) {
+  archive("keys", d.keys, {}, "places at rising times; the particle leaves its place at the start at time 0, and is at rest after the last key");
+  archive("between", d.between, {}, "interpolation of keys; smooth: the speed is zero where the motion turns back, so the particle never passes beyond a key");
+  archive("turn_axis", d.turn_axis, direction(), "axis of turn_deg, through the particle");
+  archive("x", d.x, {}, "instead of keys: way along x, an expression of the time t: \"5 cm*sin(2*pi*t/(1 s))\", 0 at t = 0; taken at a 64th of a frame, linear in between; absent: 0");
+  archive("y", d.y, {}, "the same along y");
+  archive("z", d.z, {}, "the same along z");
+  const bool formula = !(d.x.empty() && d.y.empty() && d.z.empty());
+  archive.check(formula == d.keys.empty(), "", "expected either keys or x, y, z", formula ? "both" : "neither", "");
+  for (std::size_t k = 1; k < d.keys.size(); ++k) {
+    archive.check(d.keys[k].time > d.keys[k - 1].time, "keys[" + std::to_string(k) + "].time", "expected a time after that of the key before", number_text(d.keys[k].time), "");
+  }
+  const bool leaves = !d.keys.empty() && d.keys[0].time == 0.0 && !(d.keys[0].by.isZero(0.0) && d.keys[0].turn == 0.0);
+  archive.check(!leaves, "keys[0]", "expected the place at the start at time 0", "another", "give it a time > 0, or move the particle");
+  const auto expect_way = [&archive](const char* key, const std::string& expression) {
+    if (expression.empty()) return;
+    if (const auto fault = fault_of_way(expression)) archive.check(false, key, fault->expected, fault->found, fault->hint);
+  };
+  expect_way("x", d.x);
+  expect_way("y", d.y);
+  expect_way("z", d.z);
+}
+
+template <class Archive>
 void fields(Archive& archive, PinDesc& d) {
   archive.required("particle", d.particle, between(-kMostCount, kMostCount, kNumber), "number of the particle: from 0, negative from the end");
   archive("position", d.position, {}, "whether the position is held");
   archive("orientation", d.orientation, {}, "whether the orientation is held");
   archive("until", d.until, above(0.0, kTime), "time from which the particle is free; absent: never");
+  archive("motion", d.motion, {}, "how the pin moves the particle, which keeps its velocity when it is freed; absent: at rest");
+  if (!d.motion) return;
+  const auto& keys = d.motion->keys;
+  const bool shifts = keys.empty() || std::any_of(keys.begin(), keys.end(), [](const PinKeyDesc& key) { return !key.by.isZero(0.0); });
+  const bool turns = std::any_of(keys.begin(), keys.end(), [](const PinKeyDesc& key) { return key.turn != 0.0; });
+  archive.check(d.position || !shifts, "motion", "expected a pin that holds the position it moves", "position: false", "");
+  archive.check(d.orientation || !turns, "motion", "expected a pin that holds the orientation it turns", "orientation: false", "");
 }
 
 template <class Archive>

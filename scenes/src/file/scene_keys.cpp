@@ -15,7 +15,7 @@
 
 #include "file/fields_archive.h"
 #include "file/read_scene_faults.h"
-#include "output/camera.h"
+#include "output/pictures/camera.h"
 #include "supple/core/hash.h"
 
 namespace supple::scenes {
@@ -25,9 +25,9 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::size_t kMostShown = 6;  // keys in a message
 
 /// Keys that change pictures and files but not the motion, on every level.
-constexpr std::array<std::string_view, 20> kLooks = {
+constexpr std::array<std::string_view, 21> kLooks = {
     "schema", "title", "duration", "camera", "cameras", "light", "lights", "background", "render", "output", "colour", "roughness",
-    "look", "visible", "texture", "meshing", "bulge", "bulge_volume", "bulge_width", "bulge_literal"};
+    "look", "visible", "texture", "smooth_deg", "meshing", "bulge", "bulge_volume", "bulge_width", "bulge_literal"};
 constexpr std::string_view kDrawnExtent = "extent";  // of a plane, which has no end
 
 /// Keys at the top that change no picture, and those of the output that do.

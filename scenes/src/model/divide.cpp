@@ -17,7 +17,7 @@ void find_excluded(const Model& model, const std::vector<Body>& bodies, Division
     const std::uint32_t a = bodies[division.body[k]].object;
     for (std::size_t j = k + 1; j < excluded.size(); ++j) {
       const std::uint32_t b = bodies[division.body[j]].object;
-      if (a == b || model.rules.allowed(a, b) || !division.pressure[k].surface_box().overlaps(division.pressure[j].surface_box())) continue;
+      if (a == b || may_touch(model, a, b) || !division.pressure[k].surface_box().overlaps(division.pressure[j].surface_box())) continue;
       excluded[k].push_back(j);
       excluded[j].push_back(k);
       any = true;
@@ -57,7 +57,7 @@ Division division_of(const Model& model, const std::vector<Body>& bodies, std::s
   });
   out.pressure.reserve(pressure.size());
   for (auto& c : pressure) out.pressure.push_back(std::move(*c));
-  if (model.rules.allowed) find_excluded(model, bodies, out);
+  if (model.rules.allowed || !model.closed.empty()) find_excluded(model, bodies, out);
   return out;
 }
 

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "output/folder_lock.h"
-#include "output/output_files.h"
+#include "output/files/folder_lock.h"
+#include "output/files/output_files.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"

@@ -8,6 +8,7 @@
 
 #include "file/course.h"
 #include "model/arrangement.h"
+#include "model/led_pins.h"
 #include "model/material.h"
 #include "model/model_contact.h"
 #include "model/model_faults.h"
@@ -22,6 +23,8 @@ namespace supple::scenes {
 namespace {
 
 constexpr double kCellsAlong = 64.0;   // at least, along the largest side of an object with its supports
+
+constexpr double kRounding = 1e-12;  // of a time that is a sum of steps
 
 constexpr double kBelievable = 1e4;     // ways of a particle over the size of everything, and over that in a frame
 
@@ -97,6 +100,95 @@ Vec3 centre_of(std::span<const Vec3> position, std::span<const double> mass) {
   return sum / all;
 }
 
+/// Skeleton, blending graph and held volume of an object with this arrangement.
+void add_surface(const ObjectDesc& d, const std::string& key, const core::Arrangement& arrangement, ObjectModel& object, ModelFaults& faults) {
+  const auto n = static_cast<std::uint32_t>(arrangement.size());
+  std::vector<double> volume;
+  object.skeleton = build_skeleton(d, key, n, volume, faults);
+  if (d.blend) {
+    object.skeleton.blend = blend_of(*d.blend, key + ".blend", arrangement.position, faults);
+    object.fade = d.blend->fade;
+  }
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    const double iso = iso_radius(primitive, d.iso);
+    object.iso_radius = object.iso_radius == 0.0 ? iso : std::min(object.iso_radius, iso);
+  }
+  if (d.volume && !object.skeleton.primitive.empty()) hold_volume(d, key, n, std::move(volume), object, faults);
+}
+
+/// What the particles of one object follow from.
+struct ParticleSource {
+  const Scene& scene;
+  const ObjectDesc& d;
+  const core::Arrangement& arrangement;
+  std::vector<double> volume;   ///< of each particle, where the object has a material [m^3]
+  std::vector<double> mass;     ///< [kg]
+  std::vector<double> nearest;  ///< distance to the next particle [m]
+  Vec3 centre = Vec3::Zero();   ///< of mass [m]
+};
+
+/// A solid ellipsoid with the inertia of a particle: its semi-axes, in the frame of the arrangement after a turn.
+struct InertiaEllipsoid {
+  Vec3 axes = Vec3::Zero();
+  Quat turn = Quat::Identity();
+};
+
+/// The frame of a single particle is turned to the principal axes of its solid; no laws depend on it.
+InertiaEllipsoid inertia_of(const ParticleSource& s, std::uint32_t i, CarriedSolids& solids) {
+  const ParticlesDesc& particles = s.d.particles;
+  InertiaEllipsoid own{.axes = particles.inertia_axes};
+  if (particles.inertia_radius) {
+    own.axes.setConstant(*particles.inertia_radius);
+  } else if (own.axes.isZero() && !s.arrangement.inertia_radius.empty()) {
+    own.axes.setConstant(s.arrangement.inertia_radius[i]);
+  } else if (own.axes.isZero() && (s.arrangement.size() == 1 || s.d.separate)) {
+    const CarriedSolid& lone = solids.of(i);
+    own.axes = lone.axes;
+    if (s.scene.planar) own.axes.setConstant(std::sqrt(0.5 * (own.axes.x() * own.axes.x() + own.axes.y() * own.axes.y())));  // it turns about z alone
+    own.turn = lone.turn;
+  } else if (own.axes.isZero()) {
+    own.axes.setConstant(s.d.material ? cube_inertia_radius(s.volume[i]) : 0.5 * s.nearest[i]);
+  }
+  return own;
+}
+
+/// A fault where a particle has no extent.
+void expect_extent(const ObjectDesc& d, const std::string& key, std::size_t n, const Vec3& axes, ModelFaults& faults) {
+  if (axes.maxCoeff() > 0.0 || faults.has(key + ".iso")) return;  // without a surface there is no solid
+  faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
+                  n > 1 && !d.separate ? "two particles are at the same place: this key is required"
+                  : d.skeleton.empty() ? "a single particle without a surface: this key is required"
+                                       : "no point was found where the field of its skeleton reaches the iso value");
+}
+
+void add_particle(const ParticleSource& s, std::uint32_t i, const InertiaEllipsoid& own, Model& model) {
+  const core::Arrangement& arrangement = s.arrangement;
+  const ParticlesDesc& given = s.d.particles;
+  const Vec3 inertia = principal_moments(s.mass[i], own.axes);
+  Quat q = arrangement.orientation[i];
+  if (own.turn.w() != 1.0) q = (q * own.turn).normalized();
+  model.particles.mass.push_back(s.mass[i]);
+  model.particles.inertia.push_back(inertia);
+  model.particles.normal.push_back(own.turn.conjugate() * (arrangement.normal.empty() ? given.own_normal.normalized() : arrangement.normal[i]));
+  model.particles.object.push_back(static_cast<std::uint32_t>(model.objects.size()));
+  model.particles.pinned.push_back(0);
+  model.particles.kind.push_back(0);
+  model.initial.position.push_back(arrangement.position[i]);
+  model.initial.orientation.push_back(q);
+  const Vec3 velocity = arrangement.velocity.empty() ? Vec3(Vec3::Zero()) : arrangement.velocity[i];
+  model.initial.velocity.push_back(velocity + given.velocity + given.spin.cross(arrangement.position[i] - s.centre));
+  model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * given.spin));
+}
+
+/// Length that particle i makes the scene resolve.
+double length_of(const ParticleSource& s, std::uint32_t i, const Vec3& axes, const ObjectModel& object) {
+  // Bodies that only meet by their surfaces may begin anywhere; what begins in one place has no distance to resolve.
+  const bool only_touches = s.d.separate && object.iso_radius > 0.0;
+  if (s.nearest[i] > 0.0 && std::isfinite(s.nearest[i]) && !only_touches) return s.nearest[i];
+  if (s.arrangement.size() == 1) return 0.5 * object.rest_diameter;
+  return object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff();
+}
+
 /// Particles of one object.
 void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& key, ObjectModel& object, Model& model,
                    ModelFaults& faults) {
@@ -108,70 +200,24 @@ void add_particles(const Scene& scene, const ObjectDesc& d, const std::string& k
     faults.add_once(key + ".particles.file", "expected at least one particle", "none", "");
     return;
   }
-  std::vector<double> volume;
-  object.skeleton = build_skeleton(d, key, n, volume, faults);
-  if (d.blend) {
-    object.skeleton.blend = blend_of(*d.blend, key + ".blend", arrangement.position, faults);
-    object.fade = d.blend->fade;
-  }
-  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
-    const double iso = iso_radius(primitive, d.iso);
-    object.iso_radius = object.iso_radius == 0.0 ? iso : std::min(object.iso_radius, iso);
-  }
-
-  if (d.volume && !object.skeleton.primitive.empty()) hold_volume(d, key, n, std::move(volume), object, faults);
-
+  add_surface(d, key, arrangement, object, faults);
   const PointTree tree(arrangement.position);
-  const std::vector<double> nearest = tree.nearest_distances();
-  std::vector<double> volumes;
+  ParticleSource source{.scene = scene, .d = d, .arrangement = arrangement, .volume = {}, .mass = {}, .nearest = tree.nearest_distances()};
   if (d.material) {
-    volumes = material_volumes(d, key, arrangement, object.skeleton, faults);
-    object.solid_volume = std::accumulate(volumes.begin(), volumes.end(), 0.0);
+    source.volume = material_volumes(d, key, arrangement, object.skeleton, faults);
+    object.solid_volume = std::accumulate(source.volume.begin(), source.volume.end(), 0.0);
   }
-  const std::vector<double> masses = masses_of(d, arrangement, volumes);
-  const Vec3 centre = centre_of(arrangement.position, masses);
-  // The frame of a single particle is turned to the principal axes of its solid; no laws depend on it.
+  source.mass = masses_of(d, arrangement, source.volume);
+  source.centre = centre_of(arrangement.position, source.mass);
   CarriedSolids solids(d, object.skeleton, n, scene.planar);
-  std::vector<Quat> turn(n, Quat::Identity());
+  std::vector<Quat> turn;
   for (std::uint32_t i = 0; i < n; ++i) {
-    Vec3 axes = d.particles.inertia_axes;
-    if (d.particles.inertia_radius) {
-      axes.setConstant(*d.particles.inertia_radius);
-    } else if (axes.isZero() && !arrangement.inertia_radius.empty()) {
-      axes.setConstant(arrangement.inertia_radius[i]);
-    } else if (axes.isZero() && (n == 1 || d.separate)) {
-      const CarriedSolid& lone = solids.of(i);
-      axes = lone.axes;
-      if (scene.planar) axes.setConstant(std::sqrt(0.5 * (axes.x() * axes.x() + axes.y() * axes.y())));  // it turns about z alone
-      turn[i] = lone.turn;
-    } else if (axes.isZero()) {
-      axes.setConstant(d.material ? cube_inertia_radius(volumes[i]) : 0.5 * nearest[i]);
-    }
-    if (!(axes.maxCoeff() > 0.0) && !faults.has(key + ".iso")) {  // without a surface there is no solid
-      faults.add_once(key + ".particles.inertia_radius", "expected a length > 0 [m]", "nothing",
-                      n > 1 && !d.separate ? "two particles are at the same place: this key is required"
-                      : d.skeleton.empty() ? "a single particle without a surface: this key is required"
-                                           : "no point was found where the field of its skeleton reaches the iso value");
-    }
-    const Vec3 inertia = principal_moments(masses[i], axes);
-    Quat q = arrangement.orientation[i];
-    if (turn[i].w() != 1.0) q = (q * turn[i]).normalized();
-    model.particles.mass.push_back(masses[i]);
-    model.particles.inertia.push_back(inertia);
-    model.particles.normal.push_back(turn[i].conjugate() * (arrangement.normal.empty() ? d.particles.own_normal.normalized() : arrangement.normal[i]));
-    model.particles.object.push_back(static_cast<std::uint32_t>(model.objects.size()));
-    model.particles.pinned.push_back(0);
-    model.particles.kind.push_back(0);
-    model.initial.position.push_back(arrangement.position[i]);
-    model.initial.orientation.push_back(q);
-    const Vec3 own = arrangement.velocity.empty() ? Vec3(Vec3::Zero()) : arrangement.velocity[i];
-    model.initial.velocity.push_back(own + d.particles.velocity + d.particles.spin.cross(arrangement.position[i] - centre));
-    model.initial.angular_momentum.emplace_back(q * inertia.cwiseProduct(q.conjugate() * d.particles.spin));
-    if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff());
-    // Bodies that only meet by their surfaces may begin anywhere; what begins in one place has no distance to resolve.
-    const bool only_touches = d.separate && object.iso_radius > 0.0;
-    const double alone = n == 1 ? 0.5 * object.rest_diameter : object.iso_radius > 0.0 ? object.iso_radius : axes.maxCoeff();
-    model.smallest_length = std::min({model.smallest_length, nearest[i] > 0.0 && std::isfinite(nearest[i]) && !only_touches ? nearest[i] : alone});
+    const InertiaEllipsoid own = inertia_of(source, i, solids);
+    expect_extent(d, key, n, own.axes, faults);
+    add_particle(source, i, own, model);
+    turn.push_back(own.turn);
+    if (n == 1) object.rest_diameter = 2.0 * (object.iso_radius > 0.0 ? object.iso_radius : own.axes.maxCoeff());
+    model.smallest_length = std::min(model.smallest_length, length_of(source, i, own.axes, object));
   }
   turn_primitives(turn, object.skeleton);
   if (object.iso_radius > 0.0) model.smallest_length = std::min(model.smallest_length, object.iso_radius);
@@ -198,6 +244,7 @@ void add_pins_and_loads(const Scene& scene, const ObjectDesc& d, const std::stri
     } else {
       model.particles.pinned[object.first + *index] |= pins;
     }
+    if (d.pins[k].motion) add_led_pin(scene, d.pins[k], key + ".pins[" + std::to_string(k) + ']', object.first + *index, pins, model, faults);
   }
   for (std::size_t k = 0; k < d.loads.size(); ++k) {
     const LoadDesc& load = d.loads[k];
@@ -348,6 +395,9 @@ void set_believable(const Scene& scene, const Box& everything, Model& model) {
     start = std::max(start, model.initial.position[i].norm());
     speed = std::max(speed, model.initial.velocity[i].norm());
   }
+  for (const core::LedPin& pin : model.led) {
+    for (int k = 0; k <= scene.frame_count(); ++k) start = std::max(start, pin.place(k / scene.frame_rate).position.norm());
+  }
   for (const FixedBody& body : model.fixed) {
     for (const ObstacleKeyDesc& key : body.motion.keys) start = std::max(start, key.at.norm());
   }
@@ -363,10 +413,145 @@ void set_believable(const Scene& scene, const Box& everything, Model& model) {
                       .acceleration = scene.gravity.norm() + acceleration};
 }
 
+/// Particles, surfaces, pins and loads of all objects.
+void add_objects(const Scene& scene, Model& model, ModelFaults& faults) {
+  for (const ObjectDesc& d : scene.objects) {
+    const std::string key = "objects." + d.name;
+    SUPPLE_EXPECTS(d.particles.mass.value_or(kUnitMass) > 0.0);
+    ObjectModel object;
+    object.name = d.name;
+    add_particles(scene, d, key, object, model, faults);
+    if (object.first == object.last) continue;
+    if (d.contact) {
+      object.material = contact_material(d, object.skeleton);
+      object.collides = !object.skeleton.primitive.empty();
+      object.breaks = d.breaking.has_value() || !d.cuts.empty();
+    }
+    object.separate = d.separate;
+    if (object.collides && !object.separate) divide_by_blend(d, object);
+    set_kinds(d, key, object, model, faults);
+    object.hinges_join = d.hinges_join;
+    add_pins_and_loads(scene, d, key, object, model, faults);
+    model.objects.push_back(std::move(object));
+  }
+  if (model.particles.size() == 0 && faults.none()) faults.add("objects", "expected at least one object with particles", "none", "");
+  faults.raise();  // what follows needs particles
+}
+
+/// The rest pose, and what is held at the start.
+void set_start(const Scene& scene, Model& model, ModelFaults& faults) {
+  model.rest = model.initial;
+  for (Vec3& velocity : model.rest.velocity) velocity.setZero();
+  for (Vec3& momentum : model.rest.angular_momentum) momentum.setZero();
+  if (scene.planar) confine_to_plane(model, faults);
+  model.held = model.particles.pinned;
+  model.particles.pinned = pinned_at(model, 0.0);
+  stop_pinned(model);
+  expect_resolved(model, faults);
+  sort_led_pins(scene, model, faults);
+}
+
+/// Laws and damping of all objects. @return how their links break and yield
+std::vector<core::LinkRule> add_all_laws(const Scene& scene, Model& model, ModelFaults& faults) {
+  model.interactions.gravity = scene.gravity;
+  add_changing_fields(scene, model, faults);
+  std::vector<core::LinkRule> link_rules;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const ObjectDesc& d = scene.objects[i];
+    const auto object = static_cast<std::uint32_t>(i);
+    add_laws(d.interactions, model.objects[i], "objects." + d.name, model, faults);
+    if (d.material) add_material_laws(d, model.objects[i], "objects." + d.name, model, faults);
+    if (d.breaking || d.yielding || !d.cuts.empty()) link_rules.push_back(link_rule(d, object));
+    if (d.rayleigh && d.rayleigh->mass > 0.0) model.interactions.medium.push_back({object, d.rayleigh->mass, d.rayleigh->mass});
+    if (d.rayleigh && d.rayleigh->stiffness > 0.0) model.interactions.stiffness_damping.push_back({object, d.rayleigh->stiffness});
+    if (d.medium) model.interactions.medium.push_back({object, d.medium->linear, d.medium->angular});
+  }
+  return link_rules;
+}
+
+/// What an object's mesh is to resolve.
+struct ObjectExtent {
+  Box box;                                                     ///< with its surface [m]
+  double cell = std::numeric_limits<double>::infinity();       ///< that fits [m]
+  bool thin = false;                                           ///< its thickness decides about the cell
+};
+
+ObjectExtent extent_of(const ObjectModel& object, const Model& model) {
+  ObjectExtent own;
+  double reach = object.iso_radius;
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    const double thickness = 2.0 * (iso_radius(primitive, object.skeleton.iso) + solid_half_size(primitive));
+    own.cell = std::min(own.cell, thickness / kCellsAcross);
+    reach = std::max(reach, primitive.offset.position.norm() + largest_radius(primitive));
+  }
+  for (std::uint32_t p = object.first; p < object.last; ++p) {
+    own.box = own.box.united(Box{model.rest.position[p], model.rest.position[p]}.inflated(reach));
+  }
+  const double coarsest = own.box.extent().maxCoeff() / kCellsAlong;
+  own.thin = !object.skeleton.primitive.empty() && own.cell < coarsest;
+  if (!object.skeleton.primitive.empty() && !own.thin) own.cell = coarsest;
+  return own;
+}
+
+/// Cells and errors of the meshes of all objects. @return the box of all objects with their surfaces
+Box set_cells(const Scene& scene, Model& model) {
+  double cell = std::numeric_limits<double>::infinity();
+  double least_own = cell;
+  Box everything;
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    ObjectModel& object = model.objects[i];
+    const ObjectMeshingDesc& meshing = scene.objects[i].meshing;
+    object.own_cell = meshing.cell.has_value();
+    object.cell_is_stated = object.own_cell || scene.output.cell;
+    object.own_error = meshing.error.has_value();
+    object.mesh_error = meshing.error ? meshing.error : scene.output.meshing.error;
+    if (scene.accuracy && !object.mesh_error) object.mesh_error = error_by_accuracy(scene, object);
+    if (meshing.cell) least_own = std::min(least_own, *meshing.cell);
+    const ObjectExtent own = extent_of(object, model);
+    if (!object.own_cell && own.cell < cell) {
+      cell = own.cell;
+      model.thinnest.reset();
+      if (own.thin && !scene.output.cell) model.thinnest = static_cast<std::uint32_t>(i);
+    }
+    everything = everything.united(own.box);
+  }
+  if (!std::isfinite(cell)) cell = least_own;
+  if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    ObjectModel& object = model.objects[i];
+    object.look = scene.objects[i].look;
+    if (!object.skeleton.primitive.empty()) object.cell = scene.objects[i].meshing.cell.value_or(model.cell);
+  }
+  return everything;
+}
+
+/// Rules of meshes; velocities of their vertices where pictures need them.
+void set_meshing(const Scene& scene, Model& model) {
+  model.meshing = scene.output.meshing;
+  if (scene.output.images) {
+    const auto& formats = scene.output.images->formats;
+    if (std::find(formats.begin(), formats.end(), ImageName::Exr) != formats.end()) model.meshing.motion = true;
+  }
+  if (scene.render.shutter > 0.0) model.meshing.motion = true;
+}
+
 }  // namespace
 
+std::vector<collision::BodyPair> closed_at(const Model& model, double time) {
+  std::vector<collision::BodyPair> closed;
+  for (const ContactWindow& window : model.windows) {
+    if (time < window.from * (1.0 - kRounding) || time >= window.until * (1.0 - kRounding)) closed.push_back(window.pair);
+  }
+  std::sort(closed.begin(), closed.end());
+  return closed;
+}
+
+bool may_touch(const Model& model, std::uint32_t a, std::uint32_t b) {
+  return (!model.rules.allowed || model.rules.allowed(a, b)) &&
+         !std::binary_search(model.closed.begin(), model.closed.end(), collision::BodyPair{std::min(a, b), std::max(a, b)});
+}
+
 std::vector<std::uint8_t> pinned_at(const Model& model, double time) {
-  constexpr double kRounding = 1e-12;  // of a time that is a sum of steps
   std::vector<std::uint8_t> pinned = model.held;
   for (const PinRelease& release : model.releases) {
     if (time < release.time * (1.0 - kRounding)) pinned[release.particle] |= release.pins;
@@ -388,105 +573,16 @@ Model build_model(const Scene& scene, double memory) {
   Model model;
   ModelFaults faults(scene);
   model.smallest_length = std::numeric_limits<double>::infinity();
-  for (const ObjectDesc& d : scene.objects) {
-    const std::string key = "objects." + d.name;
-    SUPPLE_EXPECTS(d.particles.mass.value_or(kUnitMass) > 0.0);
-    ObjectModel object;
-    object.name = d.name;
-    add_particles(scene, d, key, object, model, faults);
-    if (object.first == object.last) continue;
-    if (d.contact) {
-      object.material = contact_material(d, object.skeleton);
-      object.collides = !object.skeleton.primitive.empty();
-      object.breaks = d.breaking.has_value() || !d.cuts.empty();
-    }
-    object.separate = d.separate;
-    if (object.collides && !object.separate) divide_by_blend(d, object);
-    set_kinds(d, key, object, model, faults);
-    object.hinges_join = d.hinges_join;
-    add_pins_and_loads(scene, d, key, object, model, faults);
-    model.objects.push_back(std::move(object));
-  }
-  if (model.particles.size() == 0 && faults.none()) faults.add("objects", "expected at least one object with particles", "none", "");
-  faults.raise();  // the following code needs particles
-
-  model.rest = model.initial;
-  for (Vec3& velocity : model.rest.velocity) velocity.setZero();
-  for (Vec3& momentum : model.rest.angular_momentum) momentum.setZero();
-  if (scene.planar) confine_to_plane(model, faults);
-  model.held = model.particles.pinned;
-  model.particles.pinned = pinned_at(model, 0.0);
-  stop_pinned(model);
-  expect_resolved(model, faults);
-
-  model.interactions.gravity = scene.gravity;
-  add_changing_fields(scene, model, faults);
-  std::vector<core::LinkRule> link_rules;
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const ObjectDesc& d = scene.objects[i];
-    add_laws(d.interactions, model.objects[i], "objects." + d.name, model, faults);
-    if (d.material) add_material_laws(d, model.objects[i], "objects." + d.name, model, faults);
-    if (d.breaking || d.yielding || !d.cuts.empty()) link_rules.push_back(link_rule(d, static_cast<std::uint32_t>(i)));
-    if (d.rayleigh) {
-      const auto object = static_cast<std::uint32_t>(i);
-      if (d.rayleigh->mass > 0.0) model.interactions.medium.push_back({object, d.rayleigh->mass, d.rayleigh->mass});
-      if (d.rayleigh->stiffness > 0.0) model.interactions.stiffness_damping.push_back({object, d.rayleigh->stiffness});
-    }
-    if (d.medium) {
-      model.interactions.medium.push_back({static_cast<std::uint32_t>(i), d.medium->linear, d.medium->angular});
-    }
-  }
+  add_objects(scene, model, faults);
+  set_start(scene, model, faults);
+  const std::vector<core::LinkRule> link_rules = add_all_laws(scene, model, faults);
   build_contact(scene, budget, model, faults);
   faults.raise();
   model.links = core::make_links(model.particles, model.rest, model.interactions, link_rules);
   for (std::size_t i = 0; i < scene.objects.size(); ++i) add_cuts(scene.objects[i], "objects." + scene.objects[i].name, model.objects[i], model, faults);
   faults.raise();
-
-  double cell = std::numeric_limits<double>::infinity();
-  double least_own = cell;
-  Box everything;
-  for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    ObjectModel& object = model.objects[i];
-    const ObjectMeshingDesc& meshing = scene.objects[i].meshing;
-    object.own_cell = meshing.cell.has_value();
-    object.cell_is_stated = object.own_cell || scene.output.cell;
-    object.own_error = meshing.error.has_value();
-    object.mesh_error = meshing.error ? meshing.error : scene.output.meshing.error;
-    if (scene.accuracy && !object.mesh_error) object.mesh_error = error_by_accuracy(scene, object);
-    if (meshing.cell) least_own = std::min(least_own, *meshing.cell);
-    double fitting = std::numeric_limits<double>::infinity();
-    double reach = object.iso_radius;
-    for (const implicit::Primitive& primitive : object.skeleton.primitive) {
-      const double thickness = 2.0 * (iso_radius(primitive, object.skeleton.iso) + solid_half_size(primitive));
-      fitting = std::min(fitting, thickness / kCellsAcross);
-      reach = std::max(reach, primitive.offset.position.norm() + largest_radius(primitive));
-    }
-    Box own;
-    for (std::uint32_t p = object.first; p < object.last; ++p) {
-      own = own.united(Box{model.rest.position[p], model.rest.position[p]}.inflated(reach));
-    }
-    const bool thin = !object.skeleton.primitive.empty() && fitting < own.extent().maxCoeff() / kCellsAlong;
-    if (!object.skeleton.primitive.empty() && !thin) fitting = own.extent().maxCoeff() / kCellsAlong;
-    if (!object.own_cell && fitting < cell) {
-      cell = fitting;
-      model.thinnest.reset();
-      if (thin && !scene.output.cell) model.thinnest = static_cast<std::uint32_t>(i);
-    }
-    everything = everything.united(own);
-  }
-  model.meshing = scene.output.meshing;
-  if (scene.output.images) {
-    const auto& formats = scene.output.images->formats;
-    if (std::find(formats.begin(), formats.end(), ImageName::Exr) != formats.end()) model.meshing.motion = true;
-  }
-  if (scene.render.shutter > 0.0) model.meshing.motion = true;
-  if (!std::isfinite(cell)) cell = least_own;
-  if (std::isfinite(cell)) model.cell = scene.output.cell.value_or(cell);
-  for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    ObjectModel& object = model.objects[i];
-    object.look = scene.objects[i].look;
-    if (!object.skeleton.primitive.empty()) object.cell = scene.objects[i].meshing.cell.value_or(model.cell);
-  }
+  const Box everything = set_cells(scene, model);
+  set_meshing(scene, model);
   set_believable(scene, everything, model);
   return model;
 }

@@ -255,7 +255,9 @@ void add_pairs(const Scene& scene, Model& model, ModelFaults& faults, std::vecto
     if (d.dissipation) combined.dissipation = *d.dissipation;
     if (d.restitution) combined.dissipation = dissipation_for(d.restitution->value, d.restitution->at_speed);
     model.rules.overrides.push_back({pair, combined});
+    if (d.from > 0.0 || std::isfinite(d.until)) model.windows.push_back({pair, d.from, d.until});
   }
+  model.closed = closed_at(model, 0.0);
   std::sort(forbidden.begin(), forbidden.end());
   std::sort(model.rules.overrides.begin(), model.rules.overrides.end(),
             [](const auto& a, const auto& b) { return a.pair < b.pair; });

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "model/model_faults.h"
-#include "output/memory_budget.h"
+#include "output/run/memory_budget.h"
 #include "supple/scenes/model.h"
 
 namespace supple::scenes {

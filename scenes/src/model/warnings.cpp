@@ -10,7 +10,7 @@
 #include "file/fields_rules.h"
 #include "file/read_scene_faults.h"
 #include "model/model_contact.h"
-#include "output/search_choice.h"
+#include "output/meshes/search_choice.h"
 #include "supple/core/counted.h"
 
 namespace supple::scenes {

@@ -372,11 +372,10 @@ collision::ContactRules make_body_rules(const Model& model, const std::vector<Bo
   }
   std::sort(rules.overrides.begin(), rules.overrides.end(),
             [](const auto& x, const auto& y) { return x.pair < y.pair; });
-  rules.allowed = [&allowed = model.rules.allowed, &objects = model.objects, object, leader, origin, apart](std::uint32_t a,
-                                                                                                       std::uint32_t b) {
+  rules.allowed = [&model, &objects = model.objects, object, leader, origin, apart](std::uint32_t a, std::uint32_t b) {
     if (object[a] != object[b]) {
       const auto is_group = [&](std::uint32_t body) { return body < origin.size() && origin[body].is_group(); };
-      return !is_group(a) && !is_group(b) && (!allowed || allowed(object[a], object[b]));
+      return !is_group(a) && !is_group(b) && may_touch(model, object[a], object[b]);
     }
     const Meeting meeting = meeting_of(objects[object[a]], origin[a], origin[b]);
     if (meeting != Meeting::OnceApart) return meeting == Meeting::Always;

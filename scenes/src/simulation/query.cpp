@@ -10,9 +10,9 @@
 
 #include "file/read_scene_faults.h"
 #include "model/warnings.h"
-#include "output/search_choice.h"
-#include "output/search_files.h"
-#include "output/spare_memory.h"
+#include "output/meshes/search_choice.h"
+#include "output/meshes/search_files.h"
+#include "output/run/spare_memory.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"

@@ -145,6 +145,7 @@ void Simulation::Impl::make_step() {
 void Simulation::Impl::begin_step() {
   drop_results();
   release_pins();
+  switch_contacts();
   if (state.substep == 0) {
     last_frame = state;
     state.halvings = std::max(0, first_halvings(scene, model, integrator, laws, state) + options.finer);
@@ -214,7 +215,7 @@ void Simulation::Impl::advance_particles(double begin, double h) {
       depths.predict(pose, out);
     };
   }
-  const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr}, begin, h,
+  const core::StepReport report = core::advance(integrator.settings, {particles, awake_laws, forces, contact.find ? &contact : nullptr, model.led}, begin, h,
                                                 {state.particles, state.kick, state.ledger}, {executor, workspace, integrator_workspace});
   book_work(report);
   if (!core::is_implicit(method)) return;
@@ -285,7 +286,7 @@ void Simulation::Impl::refine_step() {
 
 void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, double at, core::ForceSample& out) {
   out.reset(particles.size());
-  if (!options.skip || plan.on(Stage::Interact)) {
+  if (!options.skip || plan.on(Stage::Interact) || !added_loads.empty()) {
     StageProfile& p = profile[static_cast<std::size_t>(Stage::Interact)];
     StageTimer timer(p, timed);
     const core::InteractionCounts counts = core::accumulate_interactions(particles, at_state, awake_laws, executor, workspace, out.internal);
@@ -390,6 +391,8 @@ bool Simulation::advance_to(int frame, const std::function<bool()>& go_on) {
 void Simulation::adopt(State state) { impl_->adopt(std::move(state)); }
 
 void Simulation::set_particles(const ParticleChange& change) { impl_->set_particles(change); }
+
+void Simulation::set_loads(const core::Loads& loads) { impl_->set_loads(loads); }
 
 void Simulation::restore(State state) {
   SUPPLE_EXPECTS(state.particles.size() == impl_->model.particles.size());

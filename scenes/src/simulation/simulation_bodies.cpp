@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "model/led_pins.h"
 #include "simulation/contact_work.h"
 #include "simulation/held_volumes.h"
 #include "simulation/pieces.h"
@@ -37,6 +38,7 @@ void Simulation::Impl::leave_overlapping() {
 /// The remaining laws, and data derived from them.
 void Simulation::Impl::form_laws() {
   laws = core::intact(model.interactions, model.links, state.links);
+  laws.external.insert(laws.external.end(), added_loads.begin(), added_loads.end());
   form_awake();
 }
 
@@ -123,6 +125,31 @@ void Simulation::Impl::release_pins() {
   for (const std::uint32_t i : freed) state.sleep.quiet_for[i] = 0.0;
 }
 
+/// Before a step: lets pairs touch, or pass through each other, from this time on. What this changes of the contact energy is external work.
+void Simulation::Impl::switch_contacts() {
+  if (model.windows.empty()) return;
+  std::vector<collision::BodyPair> now = closed_at(model, time());
+  if (now == model.closed) return;
+  const double held = contact_energy();
+  const auto of_window = [&](std::uint32_t object) {
+    return std::any_of(model.windows.begin(), model.windows.end(), [&](const ContactWindow& window) { return window.pair.a == object || window.pair.b == object; });
+  };
+  std::vector<std::uint32_t> roused;
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (of_window(bodies[i].object)) roused.push_back(i);
+  }
+  model.closed = std::move(now);
+  state.kick.valid = false;
+  divide_anew();
+  renew_pulled();
+  drop_results();
+  wake(roused);
+  if (scene.sleep) {
+    for (const std::uint32_t i : roused) state.sleep.quiet_for[i] = 0.0;
+  }
+  state.ledger.external_work += contact_energy() - held;
+}
+
 /// Between two steps: breaks and yields links. New pieces get new seeds and forces. The energy of surfaces that no longer
 /// exist is booked with the links.
 void Simulation::Impl::update_links() {
@@ -170,6 +197,12 @@ std::vector<std::uint32_t> Simulation::Impl::wake(const std::vector<std::uint32_
 void Simulation::Impl::wake_loaded() {
   if (!scene.sleep) return;
   std::vector<std::uint32_t> loaded = newly_loaded(bodies, laws, time(), time() + dt());
+  for (const core::LedPin& pin : model.led) {
+    if (!leads(pin, time(), time() + dt())) continue;
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+      if (std::find(bodies[i].particle.begin(), bodies[i].particle.end(), pin.particle) != bodies[i].particle.end()) loaded.push_back(i);
+    }
+  }
   if (awake.size() < bodies.size()) {
     const std::vector<std::uint32_t> stirred = find_stirred(context(), state.particles, time() + dt(), frame);
     loaded.insert(loaded.end(), stirred.begin(), stirred.end());

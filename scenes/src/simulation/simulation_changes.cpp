@@ -1,6 +1,7 @@
 #include "simulation/simulation_impl.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "simulation/pieces.h"
@@ -59,6 +60,7 @@ void Simulation::Impl::take(State other) {
   state.particles = std::move(arrays);
   created_before.reset();
   if (!model.releases.empty()) model.particles.pinned = pinned_at(model, time());
+  model.closed = closed_at(model, time());
   form_bodies();
   form_laws();
   SUPPLE_EXPECTS(state.samples.size() == bodies.size());
@@ -120,6 +122,44 @@ void Simulation::Impl::set_particles(const ParticleChange& change) {
   state.ledger.external_impulse += now.momentum - motion.momentum;
   state.ledger.external_angular_impulse += now.angular_momentum - motion.angular_momentum;
   state.ledger.external_work += energies().total() - energy;
+}
+
+void Simulation::Impl::set_loads(const core::Loads& loads) {
+  const std::size_t n = loads.force.empty() && loads.torque.empty() ? 0 : particles.size();
+  const auto refuse = [](const std::string& expected, const std::string& found) {
+    throw Error(ErrorKind::Usage, Fault{.place = "set_loads", .key = {}, .expected = expected, .found = found, .hint = {}});
+  };
+  if (loads.force.size() != n || loads.torque.size() != n) {
+    refuse("expected " + std::to_string(particles.size()) + " forces and torques, one per particle", std::to_string(loads.force.size()) + " and " + std::to_string(loads.torque.size()));
+  }
+  for (std::size_t p = 0; p < n; ++p) {
+    if (!loads.force[p].allFinite() || !loads.torque[p].allFinite()) refuse("expected finite values", "others, of particle " + std::to_string(p));
+  }
+  std::vector<std::uint8_t> loaded(particles.size(), 0);  // before or from now on
+  for (const core::ExternalLoad& load : added_loads) loaded[load.particle] = 1;
+  added_loads.clear();
+  for (std::uint32_t p = 0; p < n; ++p) {
+    if (loads.force[p].isZero(0.0) && loads.torque[p].isZero(0.0)) continue;
+    constexpr double kForever = std::numeric_limits<double>::infinity();
+    added_loads.push_back({.particle = p, .force = loads.force[p], .torque = loads.torque[p], .begin = -kForever, .end = kForever});
+    loaded[p] = 1;
+  }
+  laws.external.resize(model.interactions.external.size());
+  laws.external.insert(laws.external.end(), added_loads.begin(), added_loads.end());
+  std::vector<std::uint32_t> stirred;
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (std::any_of(bodies[i].particle.begin(), bodies[i].particle.end(), [&](std::uint32_t p) { return loaded[p] != 0; })) stirred.push_back(i);
+  }
+  wake(stirred);
+  if (scene.sleep) {
+    for (const std::uint32_t i : stirred) state.sleep.quiet_for[i] = 0.0;
+  }
+  if (awake.size() < bodies.size()) form_awake();
+  if (awake.size() == bodies.size()) awake_laws.external = laws.external;
+  drop_results();
+  if (!state.kick.valid) return;
+  state.kick.sample.external.reset(particles.size());
+  core::add_external_loads(particles, awake_laws, time(), state.kick.sample.external);
 }
 
 }  // namespace supple::scenes

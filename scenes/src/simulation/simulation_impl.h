@@ -37,6 +37,7 @@ struct Simulation::Impl {
   // The same after State::sleep: resting particles are pinned, and laws between them are skipped.
   core::ParticleSet particles;
   core::Interactions awake_laws;
+  std::vector<core::ExternalLoad> added_loads;     ///< loads besides those of the scene
   std::vector<std::uint32_t> awake;          ///< bodies, ascending
   std::vector<collision::BodyPair> tied;     ///< bodies that laws act between
   std::vector<Body> bodies;
@@ -104,6 +105,7 @@ struct Simulation::Impl {
   void update_links();
   [[nodiscard]] std::vector<std::uint32_t> due_cuts() const;
   void release_pins();
+  void switch_contacts();
   void hold_volumes();
   std::vector<std::uint32_t> wake(const std::vector<std::uint32_t>& which);
   void wake_loaded();
@@ -114,6 +116,7 @@ struct Simulation::Impl {
   void take(State other);
   void adopt(State other);
   void set_particles(const ParticleChange& change);
+  void set_loads(const core::Loads& loads);
 
   // Checks after a step: simulation_checks.cpp.
   void note_coarse_steps();

@@ -5,8 +5,8 @@
 
 #include "file/scene_places.h"
 #include "model/divide.h"
-#include "output/camera.h"
-#include "output/picture.h"
+#include "output/pictures/camera.h"
+#include "output/pictures/picture.h"
 #include "simulation/audits.h"
 #include "simulation/stages.h"
 #include "supple/core/error.h"

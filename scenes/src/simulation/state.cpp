@@ -7,7 +7,7 @@
 #include <span>
 
 #include "file/scene_keys.h"
-#include "output/program_identity.h"
+#include "output/run/program_identity.h"
 #include "supple/core/io/atomic_file.h"
 
 namespace supple::scenes {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <span>
 
-#include "output/frame_tables.h"
+#include "output/files/frame_tables.h"
 #include "supple/core/integrate.h"
 
 namespace supple::scenes {

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "output/spare_memory.h"
+#include "output/run/spare_memory.h"
 #include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"

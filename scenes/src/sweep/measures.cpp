@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "file/read_scene_archive.h"
-#include "output/result_file.h"
-#include "output/saved_frames.h"
+#include "output/files/saved_frames.h"
+#include "output/run/result_file.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/read_scene.h"

@@ -13,8 +13,8 @@
 #include <nlohmann/json.hpp>
 
 #include "file/yaml_quantity.h"
-#include "output/folder_lock.h"
-#include "output/program_identity.h"
+#include "output/files/folder_lock.h"
+#include "output/run/program_identity.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/interrupt.h"

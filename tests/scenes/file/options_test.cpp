@@ -277,6 +277,15 @@ void add_object_rules(std::vector<Option>& all) {
   in_object("cuts.normal", turned + "[{time: 0.05, at: [0.1, 0, 0], normal: $}]", "[1, 0, 0]", "[0, 1, 0]");
   in_object("pins.until", "pins: [{particle: 0$}]", "", ", until: 0.05");
   in_object("pins.particle", "pins: [{particle: $}]", "0", "1");
+  const auto in_motion = [&](const std::string& key, const std::string& motion, const std::string& one, const std::string& other) {
+    in_object("pins.motion." + key, "pins: [{particle: 0, motion: {" + motion + "}}]", one, other);
+  };
+  in_motion("keys.time", "keys: [{time: $, by: [0.1, 0, 0]}]", "0.1", "0.2");
+  in_motion("keys.by", "keys: [{time: 0.1, by: $}]", "[0.1, 0, 0]", "[0, 0.1, 0]");
+  in_motion("keys.turn_deg", "keys: [{time: 0.1, turn_deg: $}]", "10", "20");
+  in_motion("between=linear", "keys: [{time: 0.15, by: [0.1, 0, 0]}], between: $", "smooth", "linear");
+  in_motion("turn_axis", "keys: [{time: 0.1, turn_deg: 20}], turn_axis: $", "[1, 0, 0]", "[0, 1, 0]");
+  for (const std::string axis : {"x", "y", "z"}) in_motion(axis, axis + ": \"$\"", "1 cm*t/(1 s)", "2 cm*t/(1 s)");
   in_object("pins.position", "pins: [{particle: 0, position: $}]", "true", "false");
   in_object("pins.orientation", "pins: [{particle: 0, orientation: $}]", "true", "false");
   in_object("loads.particle", "loads: [{particle: $, force: [0, 0, 1]}]", "0", "1");
@@ -437,6 +446,8 @@ void add_contact(std::vector<Option>& all) {
     on_ground("pairs." + key, rubs, ground + "pairs: [{objects: [body, ground], " + keys + "}]", one, other);
   };
   pair("collide", "collide: $", "true", "false");
+  pair("from", "from: $", "0", "0.08");
+  pair("until", "from: 0$", "", ", until: 0.01");
   pair("friction", "friction: $", "0.1", "0.3");
   pair("dissipation", "dissipation: $", "0", "0.3");
   pair("restitution.value", "restitution: {value: $, at_speed: 1}", "0.5", "0.7");
@@ -528,6 +539,7 @@ void add_pictures(std::vector<Option>& all) {
   const auto scene = [&](const std::string& key, const std::string& text, const std::string& one, const std::string& other) {
     all.push_back(differs(key, In::Picture, {.scene = text + "\n" + small}, one, other));
   };
+  scene("obstacles.smooth_deg", "obstacles: [{name: block, shape: mesh, file: block.obj, at: [0.4, 0.3, 0], smooth_deg: $}]", "30", "120");
   const auto seen = [&](const std::string& key, const std::string& keys, const std::string& one, const std::string& other) {
     Parts parts{.scene = "camera: {" + keys + "}\n" + small};
     all.push_back(differs("camera." + key, In::Picture, parts, one, other));

@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "model/warnings.h"
-#include "output/search_files.h"
+#include "output/meshes/search_files.h"
 #include "supple/cgal/surface_meshes.h"
 #include "supple/core/error.h"
 #include "supple/scenes/plan.h"

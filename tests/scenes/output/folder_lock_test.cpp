@@ -1,5 +1,5 @@
 /// Who may write to an output folder at the same time. Locks act between open files, so two of one process stand for two processes.
-#include "output/folder_lock.h"
+#include "output/files/folder_lock.h"
 
 #include <gtest/gtest.h>
 

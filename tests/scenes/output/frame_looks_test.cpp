@@ -1,9 +1,11 @@
 /// Films and contact sheets show frames of one look.
-#include "output/frame_looks.h"
+#include "output/pictures/frame_looks.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -51,6 +53,30 @@ class LooksOfFrames : public testing::Test {
 
   fs::path folder_;
 };
+
+TEST_F(LooksOfFrames, OnASheetHaveTheNumbersOfTheirFrames) {
+  // A number is in the upper left corner of each picture, and nowhere else; the numbers differ.
+  const render::Image all = render::read_png(sheet());
+  std::set<std::vector<std::uint8_t>> corners;
+  for (const int frame : {1, 2, 3}) {
+    const render::Image alone = render::read_png(folder_ / ("frames/drops.000" + std::to_string(frame) + ".png"));
+    ASSERT_EQ(alone.width, 96);
+    std::vector<std::uint8_t> corner;
+    int beside = 0;
+    for (int y = 0; y < alone.height; ++y) {
+      for (int x = 0; x < 3 * alone.width; ++x) {
+        const std::uint8_t now = all.pixels[3 * static_cast<std::size_t>((4 + y) * all.width + 4 + (frame - 1) * (96 + 4)) + static_cast<std::size_t>(x)];
+        const int changed = std::abs(now - alone.pixels[static_cast<std::size_t>(3 * y * alone.width + x)]);
+        if (x < 3 * 16 && y < 14) corner.push_back(changed > 60 ? 1 : 0);
+        else beside += changed;
+      }
+    }
+    EXPECT_EQ(beside, 0) << frame;
+    EXPECT_GT(std::count(corner.begin(), corner.end(), 1), 20) << frame;
+    corners.insert(corner);
+  }
+  EXPECT_EQ(corners.size(), 3u);
+}
 
 TEST_F(LooksOfFrames, OfTwoKindsMakeNoFilmAndRemoveTheEarlierOne) {
   const RunResult mixed = render_run(scene(kRed), options({4}));

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "output/camera.h"
+#include "output/pictures/camera.h"
 #include "supple/core/error.h"
 #include "supple/render/image.h"
 #include "supple/render/renderer.h"

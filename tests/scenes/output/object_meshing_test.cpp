@@ -10,7 +10,7 @@
 
 #include "implicit/bodies.h"
 #include "model/warnings.h"
-#include "output/search_files.h"
+#include "output/meshes/search_files.h"
 #include "supple/core/error.h"
 #include "supple/core/mesh.h"
 #include "supple/implicit/creases.h"

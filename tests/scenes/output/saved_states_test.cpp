@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "output/program_identity.h"
-#include "output/saved_frames.h"
+#include "output/files/saved_frames.h"
+#include "output/run/program_identity.h"
 #include "scenes/small_scenes.h"
 #include "supple/core/error.h"
 #include "supple/core/hash.h"

@@ -1,8 +1,11 @@
-/// Courses of loads, gravity and wind; pins that end; cuts.
+/// Courses of loads, gravity and wind; pins that end and move; cuts; loads that the caller gives.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
+#include <utility>
 
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
@@ -84,6 +87,190 @@ objects:
     interactions: [{law: bond_frame, stretch: 100, rotation: 1}]
     pins: [{particle: 0}]
 )";
+
+/// Two particles on a spring, the first one led along x.
+std::string driven(const std::string& motion, const std::string& more = "", const std::string& method = "symplectic") {
+  return "integrator: {method: " + method + "}\ntime_step: {substeps: 256}\n" + more +
+         "objects:\n  - name: a\n    particles: {arrange: line, count: 2, spacing: 0.5, mass: 0.5, inertia_radius: 0.1}\n"
+         "    interactions: [{law: bond_frame, stretch: 50, rotation: 0.5}, {law: friction, linear: 0.1, angular: 0.01}]\n"
+         "    medium: {linear: 0.2, angular: 0.1}\n    rayleigh: {stiffness: 0.002}\n"
+         "    pins: [{particle: 0, motion: {" + motion + "}}]\n";
+}
+
+TEST(MovingPins, DriveAnOscillator) {
+  // Of m u'' = -k (u - a sin(w t)), w0^2 = k/m, from rest: u = a w0^2 / (w0^2 - w^2) (sin(w t) - w/w0 sin(w0 t)).
+  const std::string text = "time_step: {substeps: 256}\nobjects:\n  - name: a\n    particles: {arrange: line, count: 2, spacing: 0.5, mass: 0.5, inertia_radius: 0.1}\n"
+                           "    interactions: [{law: bond_frame, stretch: 50, rotation: 0.5}]\n"
+                           "    pins: [{particle: 0, motion: {x: \"5 cm*sin(4*t/(1 s))\"}}]\n";
+  Simulation simulation(read(text));
+  const Vec3 start = simulation.state().particles.position[0], other = simulation.state().particles.position[1];
+  double largest = 0.0;
+  while (simulation.frame() < simulation.scene().frame_count()) {
+    simulation.step_frame();
+    const double t = simulation.time();
+    EXPECT_NEAR(simulation.state().particles.position[0].x() - start.x(), 0.05 * std::sin(4.0 * t), 1e-6);
+    const double u = 0.05 * 100.0 / (100.0 - 16.0) * (std::sin(4.0 * t) - 0.4 * std::sin(10.0 * t));
+    largest = std::max(largest, std::abs(u));
+    EXPECT_NEAR(simulation.state().particles.position[1].x() - other.x(), u, 2e-5) << t;
+  }
+  EXPECT_GT(largest, 0.05);
+}
+
+TEST(MovingPins, ReachTheirKeysAndTurn) {
+  const Simulation simulation = at_end(driven("keys: [{time: 0.25, by: [0, 0, 0.2]}, {time: 0.75, by: [0.1, 0, 0.2], turn_deg: 90}], turn_axis: [0, 0, 2]"));
+  const Simulation start(read(driven("keys: [{time: 0.25, by: [0, 0, 0.2]}]")));
+  const core::ParticleState &now = simulation.state().particles, &then = start.state().particles;
+  EXPECT_LT((now.position[0] - then.position[0] - Vec3(0.1, 0, 0.2)).norm(), 1e-14);
+  EXPECT_LT((now.orientation[0] * then.orientation[0].conjugate() * Vec3::UnitX() - Vec3::UnitY()).norm(), 1e-12);
+  EXPECT_EQ(now.velocity[0], Vec3::Zero());
+  Simulation between(read(driven("keys: [{time: 0.25, by: [0, 0, 0.2]}]")));
+  while (between.frame() < 3) between.step_frame();
+  EXPECT_NEAR(between.state().particles.position[0].z() - then.position[0].z(), 0.1, 1e-14);  // half-way to the first key
+}
+
+TEST(MovingPins, DoTheWorkThatTheBalanceLacks) {
+  // Drag, friction and stiffness damping act on what moves; gravity acts on the pinned particle, too.
+  const std::string motion = "keys: [{time: 0.4, by: [0.1, 0.05, 0.2], turn_deg: 60}, {time: 0.9, by: [0, 0, 0.1], turn_deg: -30}], turn_axis: [0, 1, 1]";
+  for (const auto& [method, error] : {std::pair{"symplectic", 1e-4}, std::pair{"rk4", 1e-4}, std::pair{"implicit_midpoint", 1e-3}}) {
+    const Simulation simulation = at_end(driven(motion, "gravity: [0, 0, -5]\n", method));
+    const Audits audits = simulation.audits();
+    EXPECT_LT(audits.energy_error, error) << method;
+    EXPECT_LT(audits.momentum_error, 1e-10) << method;
+    EXPECT_LT(audits.angular_momentum_error, 1e-4) << method;
+    EXPECT_GT(simulation.state().ledger.dissipated, 1e-3) << method;
+  }
+}
+
+TEST(MovingPins, LetGoOfWhatKeepsItsVelocity) {
+  const std::string text = std::string(kParticle) + "    pins: [{particle: 0, until: 0.5, motion: {keys: [{time: 1, by: [2, 0, 0]}], between: linear}}]\n";
+  const Simulation simulation = at_end(text);
+  EXPECT_NEAR(simulation.state().particles.velocity[0].x(), 2.0, 1e-12);
+  EXPECT_NEAR(simulation.state().particles.position[0].x(), 2.0, 1e-12);
+}
+
+TEST(MovingPins, ContinueFromASavedStateWithTheSameBits) {
+  const std::string text = driven("z: \"0.1 m*(1 - cos(5*t/(1 s)))\"");
+  const Simulation whole = at_end(text);
+  Simulation half(read(text));
+  while (half.frame() < 8) half.step_frame();
+  Simulation rest(read(text));
+  rest.restore(half.state());
+  while (rest.frame() < whole.frame()) rest.step_frame();
+  EXPECT_EQ(rest.state_hash(), whole.state_hash());
+}
+
+TEST(MovingPins, WakeTheirBody) {
+  const std::string text = "sleep: {time: 0.1}\n" + driven("keys: [{time: 0.5}, {time: 0.75, by: [0.3, 0, 0]}]");
+  const Simulation simulation = at_end(text);
+  EXPECT_GT(simulation.state().particles.position[1].x(), 0.3);
+}
+
+TEST(MovingPins, SayWhatIsWrong) {
+  const auto message = [](const std::string& pins, const std::string& more = "") {
+    try {
+      (void)build_model(read(more + std::string(kParticle) + "    pins: [" + pins + "]\n"));
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_NE(message("{particle: 0, motion: {}}").find("expected either keys or x, y, z"), std::string::npos);
+  EXPECT_NE(message("{particle: 0, motion: {x: \"t/(1 s)\"}}").find("expected a length"), std::string::npos);
+  EXPECT_NE(message("{particle: 0, motion: {x: \"1 m*cos(t/(1 s))\"}}").find("expected 0 at t = 0"), std::string::npos);
+  EXPECT_NE(message("{particle: 0, motion: {y: \"0.1 m/(t/(1 s) - 0.5) + 0.2 m\"}}").find("divisor"), std::string::npos);
+  EXPECT_NE(message("{particle: 0, motion: {keys: [{time: 0, by: [1, 0, 0]}]}}").find("expected the place at the start at time 0"), std::string::npos);
+  EXPECT_NE(message("{particle: 0, position: false, motion: {keys: [{time: 1, by: [1, 0, 0]}]}}").find("holds the position"), std::string::npos);
+  EXPECT_NE(message("{particle: 0, orientation: false, motion: {keys: [{time: 1, turn_deg: 9}]}}").find("holds the orientation"), std::string::npos);
+  EXPECT_NE(message("{particle: 0, motion: {x: \"t*1 m/s\"}}, {particle: -1, motion: {x: \"t*1 m/s\"}}").find("at most one pin with a motion"), std::string::npos);
+  EXPECT_NE(message("{particle: 0, motion: {z: \"t*1 m/s\"}}", "planar: true\n").find("in the plane"), std::string::npos);
+  EXPECT_EQ(message("{particle: 0, motion: {z: \"t*1 m/s\"}}"), "accepted");
+}
+
+TEST(GivenLoads, ActAsThoseOfTheSceneUntilTheNextCall) {
+  const std::string text = "gravity: [0, 0, -8]\n" + std::string(kChain);
+  const Simulation loaded = at_end(text + "    loads: [{particle: 5, force: [0.5, 0, 1], torque: [0, 0.1, 0]}]\n");
+  Simulation given(read(text));
+  core::Loads loads;
+  loads.reset(6);
+  loads.force[5] = {0.5, 0, 1};
+  loads.torque[5] = {0, 0.1, 0};
+  given.set_loads(loads);
+  while (given.frame() < loaded.frame()) given.step_frame();
+  EXPECT_EQ(given.state().particles.position[5], loaded.state().particles.position[5]);
+  EXPECT_NEAR(given.state().ledger.external_work, loaded.state().ledger.external_work, 1e-6);
+  given.set_loads({});
+  const double work = given.state().ledger.external_impulse.x();
+  given.step_frame();
+  EXPECT_EQ(given.state().ledger.external_impulse.x(), work);
+}
+
+TEST(GivenLoads, MayChangeInEveryStep) {
+  // A spring to the origin by hand: the particle swings as x0 cos(w t), w^2 = 8/2.
+  Simulation simulation(read("time_step: {substeps: 64}\nobjects:\n  - name: a\n    particles: {arrange: single, at: [0.3, 0, 0], mass: 2, inertia_radius: 0.1}\n"));
+  core::Loads loads;
+  loads.reset(1);
+  while (simulation.time() < 1.0) {
+    loads.force[0] = -8.0 * simulation.state().particles.position[0];
+    simulation.set_loads(loads);
+    simulation.step();
+  }
+  EXPECT_NEAR(simulation.state().particles.position[0].x(), 0.3 * std::cos(2.0 * simulation.time()), 2e-3);
+  EXPECT_LT(simulation.audits().energy_error, 1e-2);
+}
+
+TEST(GivenLoads, OfAnotherShapeAreRefused) {
+  Simulation simulation(read(kChain));
+  core::Loads loads;
+  loads.reset(5);
+  EXPECT_THROW(simulation.set_loads(loads), Error);
+  loads.reset(6);
+  loads.force[2].x() = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(simulation.set_loads(loads), Error);
+}
+
+constexpr const char* kFalling = R"(
+gravity: [0, 0, -10]
+ground: {height: 0}
+objects:
+  - {name: a, particles: {arrange: single, at: [0, 0, 0.35], mass: 1}, skeleton: [{shape: point, kernel: {radius: 0.5}}], contact: {modulus: 2e4, dissipation: 2}}
+pairs: [{objects: [a, ground], )";
+
+TEST(ContactTimes, LetBodiesPassOutsideThem) {
+  // Free fall for 0.5 s, then contact: the ball is below the ground by then, and stays there where contact has ended.
+  const Simulation never = at_end(std::string(kFalling) + "collide: false}]\n");
+  const Simulation ended = at_end(std::string(kFalling) + "until: 0.01}]\n");
+  EXPECT_EQ(ended.state().particles.position[0], never.state().particles.position[0]);
+  const Simulation held = at_end(std::string(kFalling) + "from: 0.02}]\n");  // before it touches
+  EXPECT_GT(held.state().particles.position[0].z(), 0.15);
+  Simulation dropped = at_end(std::string(kFalling) + "until: 0.75}]\n");
+  EXPECT_NEAR(dropped.state().particles.velocity[0].z(), -2.5, 0.1);  // at rest until then
+  EXPECT_LT(dropped.audits().energy_error, 1e-2);
+  EXPECT_TRUE(dropped.contacts().summary.empty());
+}
+
+TEST(ContactTimes, PushApartWhatOverlapsAsTheyBegin) {
+  Simulation simulation = at_end(std::string(kFalling) + "from: 0.25}]\n");
+  EXPECT_GT(simulation.state().ledger.external_work, 10.0);  // more than the weight does
+  EXPECT_LT(simulation.audits().energy_error, 1e-2);
+}
+
+TEST(ContactTimes, ContinueFromASavedStateWithTheSameBits) {
+  const std::string text = std::string(kFalling) + "from: 0.1, until: 0.6}]\n";
+  const Simulation whole = at_end(text);
+  for (const int frame : {2, 7, 12}) {
+    Simulation begun(read(text));
+    while (begun.frame() < frame) begun.step_frame();
+    Simulation rest(read(text));
+    rest.restore(begun.state());
+    while (rest.frame() < whole.frame()) rest.step_frame();
+    EXPECT_EQ(rest.state_hash(), whole.state_hash()) << frame;
+  }
+}
+
+TEST(ContactTimes, WakeWhatRests) {
+  const Simulation simulation = at_end("sleep: {time: 0.1}\n" + std::string(kFalling) + "until: 0.75}]\n");
+  EXPECT_NEAR(simulation.state().particles.velocity[0].z(), -2.5, 0.1);
+}
 
 TEST(Cuts, BreakBondsAtTheirTime) {
   Simulation simulation = at_end("gravity: [0, 0, -8]\n" + std::string(kChain) + "    cuts: [{time: 0.5, particles: [2, 3]}]\n");

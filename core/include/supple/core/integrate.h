@@ -6,6 +6,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 
 #include "supple/core/executor.h"
 #include "supple/core/interactions.h"
@@ -70,6 +71,13 @@ struct KickState {
   void hash(Hasher& hasher) const;
 };
 
+/// A pin that moves: where it leads what it holds of its particle.
+struct LedPin {
+  std::uint32_t particle = 0;
+  std::uint8_t pins = 0;  ///< kPinPosition, kPinOrientation: what is led
+  std::function<Pose(double time)> place;  ///< of the particle
+};
+
 /// Particles and everything that acts on them.
 struct StepProblem {
   const ParticleSet& set;
@@ -77,6 +85,8 @@ struct StepProblem {
   const ForceModel& forces;
   /// Of the implicit methods: contact as a part of the step; `forces` then leave it out. Null: all that acts beside the pair laws is frozen.
   ImplicitContact* contact = nullptr;
+  /// Pins that move, at most one of a particle, particles ascending. Those of particles that `set.pinned` does not hold are ignored. Within a step the velocity is constant; the pins' work is external.
+  std::span<const LedPin> led{};
 };
 
 /// What a step changes.
@@ -88,7 +98,7 @@ struct StepTarget {
 
 /// One step of size dt: damping dt/2 in pair order, kick dt/2, drift dt, forces, kick dt/2, damping dt/2 in reverse
 /// pair order. Friction between particles is integrated implicitly pair by pair (unconditionally stable, momentum
-/// exact); medium damping by its exact exponential. Pinned particles do not move; their impulse goes to the ledger.
+/// exact); medium damping by its exact exponential. Pinned particles move as their pins do; their impulse goes to the ledger.
 /// Calls `forces` once (twice when `kick` is not valid).
 void advance(const StepProblem& problem, double time, double dt, const StepTarget& target,
              RotationUpdate rotation = RotationUpdate::Splitting);

@@ -112,6 +112,13 @@ struct PinRelease {
   double time = 0.0;      ///< [s]
 };
 
+/// Times between which two objects or obstacles can touch.
+struct ContactWindow {
+  collision::BodyPair pair;  ///< object indices; fixed bodies follow the objects
+  double from = 0.0;         ///< [s]
+  double until = 0.0;        ///< [s], may be infinite
+};
+
 /// Links that break at a time, whatever their load.
 struct CutEvent {
   double time = 0.0;  ///< [s]
@@ -122,6 +129,7 @@ struct Model {
   core::ParticleSet particles;            ///< with the pins of the present time
   std::vector<std::uint8_t> held;         ///< pins without an end, shape [particles]
   std::vector<PinRelease> releases;
+  std::vector<core::LedPin> led;          ///< pins that move, particles ascending
   std::vector<CutEvent> cuts;
   core::ParticleState initial;
   core::ParticleState rest;               ///< rest poses (the initial arrangement)
@@ -130,6 +138,8 @@ struct Model {
   std::vector<ObjectModel> objects;       ///< in the order of the scene (by name)
   std::vector<FixedBody> fixed;           ///< the ground, if it collides, then the obstacles by name
   collision::ContactRules rules;          ///< body index = object index; fixed bodies follow the objects
+  std::vector<ContactWindow> windows;
+  std::vector<collision::BodyPair> closed;  ///< pairs of `windows` that cannot touch at the present time, sorted
   collision::ContactSettings contact;
   collision::ReactionSettings reaction;
   collision::BulgeSettings bulge;
@@ -140,9 +150,14 @@ struct Model {
   double contact_frequency = 0.0;         ///< upper estimate of sqrt(P k A / m) over the objects that collide [rad/s]
   double largest_dissipation = 0.0;       ///< d of all pairs that touch [s/m]
   double smallest_length = 0.0;           ///< smallest length that a step must resolve: nearest rest distance or iso radius [m]
-  double solid_speed = 0.0;               ///< bound of the speed of obstacles with keys [m/s]
+  double solid_speed = 0.0;               ///< bound of the speed of obstacles with keys and of pins that move [m/s]
   Believable believable;
 };
+
+/// Pairs of `windows` that cannot touch at a time, sorted.
+[[nodiscard]] std::vector<collision::BodyPair> closed_at(const Model& model, double time);
+/// Whether two objects or fixed bodies can touch at the present time.
+[[nodiscard]] bool may_touch(const Model& model, std::uint32_t a, std::uint32_t b);
 
 /// Pins of all particles at a time, shape [particles].
 [[nodiscard]] std::vector<std::uint8_t> pinned_at(const Model& model, double time);

@@ -210,12 +210,30 @@ struct RayleighDesc {
   double stiffness = 0.0;             ///< beta [s]
 };
 
+enum class LeadName : std::uint8_t { Smooth, Linear };
+
+/// objects[].pins[].motion.keys[]
+struct PinKeyDesc {
+  double time = 0.0;                  ///< [s]
+  Vec3 by = Vec3::Zero();             ///< from the place at the start [m]
+  double turn = 0.0;                  ///< [rad] (key turn_deg)
+};
+
+/// objects[].pins[].motion: where a pin leads its particle, from its place at the start
+struct PinMotionDesc {
+  std::vector<PinKeyDesc> keys;
+  LeadName between = LeadName::Smooth;
+  Vec3 turn_axis = Vec3::UnitZ();
+  std::string x, y, z;                ///< instead of keys: expressions of t [s], lengths; empty: 0
+};
+
 /// objects[].pins[]
 struct PinDesc {
   int particle = 0;                   ///< negative counts from the end: -1 is the last
   bool position = true;
   bool orientation = true;
   double until = std::numeric_limits<double>::infinity();  ///< time of its release [s]
+  std::optional<PinMotionDesc> motion;
 };
 
 /// objects[].cuts[]: bonds that break at a time
@@ -320,6 +338,8 @@ struct RestitutionDesc {
 struct PairDesc {
   std::vector<std::string> objects;   ///< two names of objects, obstacles or "ground"
   std::optional<bool> collide;
+  double from = 0.0;                  ///< time from which they can touch [s]
+  double until = std::numeric_limits<double>::infinity();  ///< and to which [s]
   std::optional<double> friction;
   std::optional<double> dissipation;
   std::optional<RestitutionDesc> restitution;
@@ -375,8 +395,6 @@ struct GroundDesc {
 
 enum class ObstacleName : std::uint8_t { Plane, Box, Heights, Mesh, Implicit };
 
-enum class LeadName : std::uint8_t { Smooth, Linear };
-
 /// obstacles[].keys[]
 struct ObstacleKeyDesc {
   double time = 0.0;                  ///< [s]
@@ -404,6 +422,7 @@ struct ObstacleDesc {
   double roughness = 0.6;
   std::optional<TextureDesc> texture;
   bool visible = true;
+  double smooth = 0.52359877559829887;  ///< mesh: edges whose faces make a smaller angle look smooth [rad] (key smooth_deg)
   double modulus = 1e6;               ///< P [Pa]
   double slope = 1.0;                 ///< |grad F| [1/m]
   double friction = 0.5;

@@ -136,6 +136,12 @@ class Simulation {
   /// @throws Error{Usage} for arrays of another shape, values that are not finite, orientations of length 0, and both angular arrays
   void set_particles(const ParticleChange& change);
 
+  /// Forces and torques that act on the particles from now on besides those of the scene, until this is called again; to be called between two steps, before
+  /// each one for forces that change. They are external loads as those of the scene: the ledger has their work and impulse. They are no part of the state:
+  /// whoever restores a state gives them again.
+  /// @param loads  about the particles' centres, world axes, shape [particles]; empty: none   @throws Error{Usage} for another shape and values that are not finite
+  void set_loads(const core::Loads& loads);
+
   /// Meshes of the current surfaces, one per object in the order of the scene (empty without skeleton); deformed by
   /// contact, with the column "contact" (implicit/polygonise.h) and those that looks need: "pressure" [Pa], "speed" [m/s],
   /// "stretch" [1], "rest_x" ... [m]. Kept until the next step.

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "output/camera.h"
-#include "output/output_files.h"
-#include "output/saved_frames.h"
+#include "output/files/output_files.h"
+#include "output/files/saved_frames.h"
+#include "output/pictures/camera.h"
 #include "output/view/view_arrays.h"
 #include "output/view/view_frame.h"
 #include "supple/core/error.h"

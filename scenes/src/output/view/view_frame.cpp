@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "output/camera.h"
-#include "output/picture.h"
+#include "output/pictures/camera.h"
+#include "output/pictures/picture.h"
 #include "output/view/view_arrays.h"
 #include "supple/core/integrate.h"
 #include "supple/scenes/contact_report.h"

@@ -1,0 +1,59 @@
+/// The program `supple_fit`, which `supple fit` starts with its own options.
+#include <filesystem>
+#include <iostream>
+#include <sstream>
+
+#include "fit.h"
+#include "print.h"
+#include "program.h"
+#include "supple/core/error.h"
+#include "supple/core/io/atomic_file.h"
+#include "supple/fit/fit.h"
+
+namespace {
+
+using namespace supple;
+using tool::print;
+namespace fs = std::filesystem;
+
+int make_object(const tool::FitArguments& a) {
+  const fs::path out = a.out, report = fs::path(a.out).replace_extension(".json");
+  if (out.extension() != ".yaml") throw Error(ErrorKind::Usage, Fault{.place = "--out", .key = {}, .expected = "expected a file name that ends in .yaml", .found = '\'' + a.out + '\'', .hint = {}});
+  for (const fs::path& path : {out, report}) {
+    if (!a.overwrite && fs::exists(path)) throw Error(ErrorKind::Usage, Fault{.place = path.string(), .key = {}, .expected = "exists", .found = {}, .hint = "replace it by --overwrite"});
+  }
+  const fit::FittedObject object = fit::fit(a.input, {.error = a.error,
+                                                      .particles = a.particles,
+                                                      .primitives = a.primitives,
+                                                      .pieces = a.pieces == "largest" ? fit::Pieces::Largest : fit::Pieces::Refuse,
+                                                      .threads = a.threads});
+  io::write_atomically(report, fit::report_json(object.report));
+  io::write_atomically(out, fit::object_text(object, fs::path(a.input).filename().string()));
+  for (const std::string& warning : object.report.warnings) print(std::cerr, "warning: %s\n", warning.c_str());
+  if (a.quiet) return 0;
+  std::cout << fit::report_text(object.report);
+  print(std::cout, "object:     %s, for a scene: objects: [{name: %s, include: %s, particles: {at: [0, 0, 1]}, scale: 1, material: jelly}]\n", a.out.c_str(), out.stem().c_str(), out.filename().c_str());
+  return 0;
+}
+
+int parse_and_fit(int argc, char** argv, bool silent) {
+  tool::FitArguments arguments;
+  arguments.quiet = silent;
+  CLI::App app(tool::kFitMeaning, "supple fit");
+  tool::add_fit_options(app, arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    std::ostringstream text;
+    app.exit(error, text, text);
+    std::cerr << tool::printable_lines(text.str());
+    return static_cast<int>(ErrorKind::Usage);
+  }
+  return make_object(arguments);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) { return supple::tool::run_program(argc, argv, parse_and_fit); }
