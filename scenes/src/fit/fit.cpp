@@ -53,19 +53,19 @@ long genus_of(const MeshReport& mesh) { return static_cast<long>(mesh.components
 /// Samples, distances and the balls that touch the surface; all lengths over the diagonal.
 struct Data {
   Data(const Mesh& given, double most, double error, const Executor& executor)
-      : mesh(given), tree(given), surface(sample_surface(given, kSamples)), grid(surface.position, surface.spacing), largest_ball(most), genus(genus_of(inspect(given))) {
+      : mesh(given), tree(given), surface(sample_surface(given, kSamples)), points(surface.position), largest_ball(most), genus(genus_of(inspect(given))) {
     constexpr double kStep = 1.0 / 48.0;
     around = sample_surroundings(mesh, tree, kStep, executor);
     constexpr double kSlack = 0.2, kBeforeHollow = 2.0;  // balls larger than a hollow blend across it
-    radius = touching_radii(surface, grid, -1.0, most, kSlack * error, executor);
-    const std::vector<double> outside = touching_radii(surface, grid, 1.0, most, kSlack * error, executor);
+    radius = touching_radii(surface, points, -1.0, most, kSlack * error, executor);
+    const std::vector<double> outside = touching_radii(surface, points, 1.0, most, kSlack * error, executor);
     for (std::size_t k = 0; k < radius.size(); ++k) radius[k] = std::min(radius[k], std::max(kBeforeHollow * outside[k], error));
   }
 
   const Mesh& mesh;
   SurfaceTree tree;
   SurfaceSamples surface;
-  PointGrid grid;
+  PointTree points;
   Surroundings around;
   std::vector<double> radius;  ///< of the largest ball at a sample, from inside and with respect to hollows outside
   double largest_ball;
@@ -207,7 +207,7 @@ void divide(std::vector<Blob>& blobs, const Data& data, const implicit::Field& f
   for (std::size_t k = 0; k < blobs.size(); ++k) {
     if (large[k] == 0) out.push_back(blobs[k]);
   }
-  const std::vector<Blob> parts = blobs_of(cover_surface(data.surface, data.grid, radius, wanted, reach));
+  const std::vector<Blob> parts = blobs_of(cover_surface(data.surface, data.points, radius, wanted, reach));
   out.insert(out.end(), parts.begin(), parts.end());
   blobs = std::move(out);
 }
@@ -225,7 +225,7 @@ Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executo
   Targets targets = targets_of(data);
   std::vector<std::uint32_t> all(data.surface.position.size());
   std::iota(all.begin(), all.end(), 0U);
-  std::vector<Ball> balls = cover_surface(data.surface, data.grid, data.radius, all, kReach * options.error);
+  std::vector<Ball> balls = cover_surface(data.surface, data.points, data.radius, all, kReach * options.error);
   cover_inside(data.around, data.largest_ball, balls);
   if (balls.size() > options.primitives) balls.resize(options.primitives);
   Skeleton out{blobs_of(balls), std::min(0.5 * options.error, 1.0 / 128.0)};
@@ -246,7 +246,7 @@ Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executo
     for (const Vec3& p : faults.outside) targets.outside.add(p, weight(p));
     reach = std::max(0.7 * reach, kLeastReach * options.error);
     divide(out.blobs, data, field, faults.outside, reach);
-    std::vector<Ball> more = cover_surface(data.surface, data.grid, data.radius, faults.missed, reach);
+    std::vector<Ball> more = cover_surface(data.surface, data.points, data.radius, faults.missed, reach);
     for (const Vec3& p : faults.inside) more.push_back({p, std::min(data.tree.distance(p), data.largest_ball)});
     more.resize(std::min<std::size_t>(more.size(), options.primitives - std::min<std::size_t>(options.primitives, out.blobs.size())));
     const std::vector<Blob> added = blobs_of(more);
@@ -277,9 +277,9 @@ void warn_of_units(FitReport& report) {
 
 /// Primitives hang on the particle whose share they lie in.
 void hang(FittedObject& object, const Skeleton& skeleton, const Packing& packing, const Surroundings& around, const Frame& frame) {
-  const PointGrid grid(around.inside, around.step);
+  const PointTree tree(around.inside);
   for (const Blob& blob : skeleton.blobs) {
-    const std::uint32_t particle = packing.share[grid.nearest(blob.centre)];
+    const std::uint32_t particle = packing.share[tree.nearest(blob.centre)];
     object.primitives.push_back({particle, frame.diagonal * (blob.centre - packing.particle[particle]), frame.diagonal * blob.axes, blob.turn});
   }
   std::stable_sort(object.primitives.begin(), object.primitives.end(), [](const auto& a, const auto& b) { return a.particle < b.particle; });
