@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "fit/balls.h"
+#include "fit/data.h"
 #include "fit/measure.h"
 #include "fit/packing.h"
 #include "fit/solve.h"
@@ -28,6 +29,9 @@ void expect_range(const char* option, bool good, const char* expected, const std
 void check(const FitOptions& options) {
   expect_range("--error", options.error >= 1e-3 && options.error <= 0.1, "expected a share of the diagonal from 0.1% to 10%", std::to_string(options.error));
   expect_range("--particles", options.particles >= 1 && options.particles <= 10000, "expected a whole number from 1 to 10000", std::to_string(options.particles));
+  const auto& window = options.volume.window;
+  expect_range("--window", !window || (*window)[0] < (*window)[1], "expected two values, the smaller one first",
+               window ? short_number((*window)[0]) + ':' + short_number((*window)[1]) : "");
   expect_range("--primitives", options.primitives >= 1 && options.primitives <= 10000, "expected a whole number from 1 to 10000", std::to_string(options.primitives));
 }
 
@@ -275,6 +279,15 @@ void warn_of_units(FitReport& report) {
   report.warnings.emplace_back(text.data());
 }
 
+/// Of surfaces that are not quite the data's.
+void warn_of_source(FitReport& report) {
+  constexpr double kFar = 0.01;
+  if (report.repair.points_rms > kFar) {
+    report.warnings.push_back("the surface through the points misses them by " + short_number(100.0 * report.repair.points_rms) + " % of the diagonal (RMS): normals may be wrong, or gaps too large");
+  }
+  if (report.repair.cut) report.warnings.emplace_back("the border of the volume cuts what lies inside, and closes the surface there");
+}
+
 /// Primitives hang on the particle whose share they lie in.
 void hang(FittedObject& object, const Skeleton& skeleton, const Packing& packing, const Surroundings& around, const Frame& frame) {
   const PointTree tree(around.inside);
@@ -296,8 +309,12 @@ void report_errors(FittedObject& object, const Data& data, const Skeleton& skele
   report.pieces_out = out.components;
   report.volume_error = out.volume / in.volume - 1.0;
   const double within = 0.05 * options.error;
-  report.from_data = measure(data.mesh, object.surface, SurfaceTree(object.surface), within, executor);
+  const SurfaceTree fitted(object.surface);
+  report.from_data = measure(data.mesh, object.surface, fitted, within, executor);
   report.to_data = measure(object.surface, data.mesh, data.tree, within, executor);
+  object.data = data.mesh;
+  object.data.columns = {{"distance", distances(data.mesh.position, fitted, executor)}};
+  object.surface.columns = {{"distance", distances(object.surface.position, data.tree, executor)}};
   report.within = report.two_sided() <= options.error;
   if (!report.within) {
     std::array<char, 200> text{};
@@ -319,12 +336,13 @@ FittedObject fit(const std::filesystem::path& file, const FitOptions& options) {
   const Executor executor(options.threads);
   FittedObject object;
   FitReport& report = object.report;
-  Mesh mesh = read_surface(file, options.pieces, report.repair);
+  Mesh mesh = read_surface(file, options, report.repair, executor);
   const Frame frame = normalise(mesh);
   report.diagonal = frame.diagonal;
   const double volume = inspect(mesh).volume;
   report.volume = volume * frame.diagonal * frame.diagonal * frame.diagonal;
   warn_of_units(report);
+  warn_of_source(report);
   const double spacing = math::pow(volume / options.particles, 1.0 / 3.0);
   constexpr double kLargestBall = 1.25;  // of the spacing: a primitive moves with one particle
   const Data data(mesh, std::min(0.5, kLargestBall * spacing), options.error, executor);
@@ -340,7 +358,10 @@ FittedObject fit(const std::filesystem::path& file, const FitOptions& options) {
   for (const Vec3& p : packing.particle) object.particles.push_back(frame.diagonal * (p - middle));
   object.bonds = packing.bond;
   report_errors(object, data, skeleton, options, executor);
-  for (Vec3& p : object.surface.position) p = frame.diagonal * (p - middle);
+  for (Mesh* one : {&object.surface, &object.data}) {
+    for (Vec3& p : one->position) p = frame.diagonal * (p - middle);
+    for (double& d : one->columns.front().values) d *= frame.diagonal;
+  }
   report.primitives = object.primitives.size();
   report.particles = object.particles.size();
   report.bonds = object.bonds.size();
