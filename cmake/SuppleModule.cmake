@@ -151,6 +151,8 @@ function(supple_install_package)
   list(JOIN SUPPLE_INSTALLED " " SUPPLE_INSTALLED)
   get_property(SUPPLE_RENDER_LIBRARIES GLOBAL PROPERTY SUPPLE_RENDER_LIBRARIES)
   list(JOIN SUPPLE_RENDER_LIBRARIES " " SUPPLE_RENDER_LIBRARIES)
+  get_property(SUPPLE_FIT_LIBRARIES GLOBAL PROPERTY SUPPLE_FIT_LIBRARIES)
+  list(JOIN SUPPLE_FIT_LIBRARIES " " SUPPLE_FIT_LIBRARIES)
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/suppleConfig.cmake.in
     ${PROJECT_BINARY_DIR}/suppleConfig.cmake INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/suppleConfigVersion.cmake COMPATIBILITY SameMinorVersion)

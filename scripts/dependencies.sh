@@ -9,7 +9,7 @@ declare -A supple_packages=(
            libdeflate-dev libopenexr-dev libosmesa6-dev libgl-dev libegl-dev libembree-dev
            libyaml-cpp-dev nlohmann-json3-dev libcli11-dev"
   [run]="libosmesa6 libegl1 libgl1-mesa-dri ffmpeg"
-  [test]="libgtest-dev libcgal-dev libopenvdb-tools"
+  [test]="libgtest-dev libcgal-dev libnifti-dev libteem-dev libopenvdb-tools"
   [python]="pybind11-dev python3-dev python3-numpy python3-venv"
   [check]="clang clang-tidy libclang-rt-dev"
   [docs]="doxygen python3-venv"
@@ -17,7 +17,7 @@ declare -A supple_packages=(
   [data]="libcgal-demo"
 )
 declare -A supple_purpose=(
-  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, Delaunay meshes and fits" [python]="for the Python package" [check]="for the second compiler and static analysis" [docs]="for the documentation site" [deb]="to try the Debian package" [data]="data to fit"
+  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, Delaunay meshes and fits of meshes and volumes" [python]="for the Python package" [check]="for the second compiler and static analysis" [docs]="for the documentation site" [deb]="to try the Debian package" [data]="data to fit"
 )
 
 # missing_packages NAME...: prints those that dpkg does not list as installed.

@@ -1,22 +1,46 @@
 #!/usr/bin/env bash
-# Fits the meshes of scripts/data.sh and prints the table of docs/fitting.md.
-#   scripts/fits.sh [SUPPLE] [FOLDER]     the tool (default: build/release/bin/supple); folder of data and objects (default: out/data)
+# Fits the data of scripts/data.sh and prints the table of docs/fitting.md; draws data beside fit, and with --films the scenes of examples/fits.
+#   scripts/fits.sh [--films] [SUPPLE] [FOLDER]     the tool (default: build/release/bin/supple); folder of data, objects and films (default: out/data)
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+films=0
+if [[ ${1:-} == --films ]]; then
+  films=1
+  shift
+fi
 tool=${1:-$root/build/release/bin/supple}
 folder=${2:-out/data}
 "$root/scripts/data.sh" "$folder" >/dev/null
-echo "| data | triangles | primitives | RMS from, to | largest from, to | volume | handles | seconds |"
-echo "|---|---|---|---|---|---|---|---|"
-for name in bunny00 femur armadillo elephant dino; do
-  "$tool" fit "$folder/$name.off" -o "$folder/$name.yaml" --error 2% --overwrite --quiet 2>/dev/null
-  python3 - "$folder/$name.json" "$name" <<'PYTHON'
+
+# fit NAME FILE OPTION...: fits one and prints its row.
+fit() {
+  local name=$1 file=$2
+  shift 2
+  "$tool" fit "$folder/$file" -o "$folder/$name.yaml" --picture "$folder/$name.png" "$@" --overwrite --quiet 2>"$folder/$name.log" || {
+    cat "$folder/$name.log" >&2
+    return 1
+  }
+  python3 - "$folder/$name.json" "$name" "$*" <<'PYTHON'
 import json
 import sys
 
 r = json.load(open(sys.argv[1]))
 share = lambda key: " %, ".join(f"{100 * r[way][key]:.2f}" for way in ("from_data", "to_data")) + " %"
-print(f"| {sys.argv[2]} | {r['repair']['triangles']} | {r['primitives']} | {share('rms')} | {share('largest')} | "
-      f"{100 * r['volume_error']:+.2f} % | {r['genus']['fit']} of {r['genus']['data']} | {r['seconds']:.0f} |")
+print(f"| {sys.argv[2]} | `{sys.argv[3]}` | {r['repair']['triangles']} | {r['primitives']} | {share('rms')} | {share('largest')} | "
+      f"{100 * r['volume_error']:+.2f} % | {r['genus']['fit']} of {r['genus']['data']} | {r['seconds']:.0f} |", flush=True)
 PYTHON
+}
+
+echo "| data | options | triangles | primitives | RMS from, to | largest from, to | volume | handles | seconds |"
+echo "|---|---|---|---|---|---|---|---|---|"
+for name in bunny00 femur armadillo elephant dino; do fit "$name" "$name.off" --error 2%; done
+fit kitten kitten.xyz --error 2%
+fit hippo hippo1.ply --error 2%
+fit liver liver.nhdr --error 2% --particles 60 --label 255 --pieces largest
+fit skull skull.nhdr --error 2% --iso 2.9 --pieces largest
+
+((films == 1)) || exit 0
+for scene in "$root"/examples/fits/*.yaml; do
+  cp "$scene" "$folder/"
+  "$tool" run "$folder/$(basename "$scene")" --out "$folder/films/$(basename "$scene" .yaml)" --overwrite
 done

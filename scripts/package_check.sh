@@ -3,7 +3,7 @@
 
 # Dependencies of each component beyond those of the components it needs: CMake packages, and libraries found by file.
 declare -A component_packages=([core]="Eigen3 TBB hwy" [implicit]="" [cgal]="" [collision]="" [render]="OpenEXR" [scenes]="yaml-cpp" [fit]="")
-declare -A component_libraries=([core]="" [implicit]="openvdb" [cgal]="gmp mpfr" [collision]="" [render]="deflate embree3" [scenes]="" [fit]="")
+declare -A component_libraries=([core]="" [implicit]="openvdb" [cgal]="gmp mpfr" [collision]="" [render]="deflate embree3" [scenes]="" [fit]="openvdb deflate niftiio teem")
 declare -A component_needs=([core]="" [implicit]="core" [cgal]="core implicit" [collision]="core implicit" [render]="core"
   [scenes]="core implicit collision render" [fit]="core implicit cgal")
 
@@ -14,7 +14,7 @@ check_component() {
   for one in Eigen3 TBB hwy OpenEXR Imath yaml-cpp nlohmann_json CLI11 pybind11 GTest; do
     [[ " $packages " == *" $one "* || ($one == Imath && " $packages " == *" OpenEXR "*) ]] || hide+=("-DCMAKE_DISABLE_FIND_PACKAGE_$one=ON")
   done
-  for one in openvdb gmp mpfr deflate embree3; do
+  for one in openvdb gmp mpfr deflate niftiio teem embree3; do
     [[ " $libraries " == *" $one "* ]] || hide+=("-DSUPPLE_${one^^}_LIBRARY=OFF")
   done
   echo "-- component $name"

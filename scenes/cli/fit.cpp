@@ -1,7 +1,9 @@
 #include "fit.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <string_view>
@@ -22,6 +24,22 @@ std::optional<double> share_in(const std::string& text) {
   return rest.empty() ? value : 0.01 * value;
 }
 
+/// 100:300.
+std::optional<std::array<double, 2>> window_in(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos) return std::nullopt;
+  std::array<double, 2> out{};
+  const char* from = text.data();
+  const char* to = from + colon;
+  for (double& value : out) {
+    const auto [end, error] = std::from_chars(from, to, value);
+    if (error != std::errc() || end != to || !std::isfinite(value)) return std::nullopt;
+    from = to + 1;
+    to = text.data() + text.size();
+  }
+  return out;
+}
+
 }  // namespace
 
 CLI::App* add_fit(CLI::App& app, FitArguments& a) {
@@ -31,7 +49,7 @@ CLI::App* add_fit(CLI::App& app, FitArguments& a) {
 }
 
 void add_fit_options(CLI::App& verb, FitArguments& a) {
-  verb.add_option("input", a.input, "mesh: .ply, .obj, .off or .stl, in metres")->required();
+  verb.add_option("input", a.input, "mesh (.ply, .obj, .off, .stl) or points (.xyz, .ply) in metres, or volume (.nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vdb)")->required();
   verb.add_option("-o,--out", a.out, "file of the object (.yaml); its report is written beside it (.json)")->required();
   verb.add_option_function<std::string>("--error", [&a](const std::string& text) { a.error = share_in(text).value_or(0.0); },
                                          "largest distance between the surfaces, as a share of the diagonal of the data's box (default: 1%)")
@@ -39,10 +57,15 @@ void add_fit_options(CLI::App& verb, FitArguments& a) {
   verb.add_option("--particles", a.particles, "number of particles (default: 200)");
   verb.add_option("--primitives", a.primitives, "largest number of primitives of the skeleton (default: 2000)");
   verb.add_option("--pieces", a.pieces, "data of several pieces: refuse (default) or largest")->check(CLI::IsMember({"refuse", "largest"}));
+  verb.add_option("--iso", a.iso, "of a volume: values above lie inside");
+  verb.add_option_function<std::string>("--window", [&a](const std::string& text) { a.window = window_in(text); }, "of a volume: values FROM:TO lie inside")
+      ->check([](const std::string& text) { return window_in(text) ? std::string() : "expected two values such as 100:300, found " + text; });
+  verb.add_option("--label", a.label, "of a volume: voxels of this number lie inside")->check(CLI::Range(0U, 16777216U));
+  verb.add_option("--picture", a.picture, "a picture (.png) of data and fit side by side, with their distances as colours");
   verb.add_option("--threads", a.threads, "number of threads (default: all); does not change the result")->check(CLI::Range(0, 1024));
   verb.add_flag("--overwrite", a.overwrite, "replace an earlier object");
   verb.add_flag("--quiet", a.quiet, "print warnings and errors only");
-  verb.footer("Example: supple fit bunny.off -o bunny.yaml --error 2% --particles 300");
+  verb.footer("Example: supple fit bunny.off -o bunny.yaml --error 2% --particles 300\n         supple fit head.nii.gz -o head.yaml --iso 40 --pieces largest");
 }
 
 void start_fit(std::span<char* const> words, bool silent) {

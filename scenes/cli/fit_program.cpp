@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "fit.h"
+#include "fit_picture.h"
 #include "print.h"
 #include "program.h"
 #include "supple/core/error.h"
@@ -19,14 +20,20 @@ namespace fs = std::filesystem;
 int make_object(const tool::FitArguments& a) {
   const fs::path out = a.out, report = fs::path(a.out).replace_extension(".json");
   if (out.extension() != ".yaml") throw Error(ErrorKind::Usage, Fault{.place = "--out", .key = {}, .expected = "expected a file name that ends in .yaml", .found = '\'' + a.out + '\'', .hint = {}});
-  for (const fs::path& path : {out, report}) {
-    if (!a.overwrite && fs::exists(path)) throw Error(ErrorKind::Usage, Fault{.place = path.string(), .key = {}, .expected = "exists", .found = {}, .hint = "replace it by --overwrite"});
+  const fs::path picture = a.picture;
+  if (!a.picture.empty() && picture.extension() != ".png") {
+    throw Error(ErrorKind::Usage, Fault{.place = "--picture", .key = {}, .expected = "expected a file name that ends in .png", .found = '\'' + a.picture + '\'', .hint = {}});
+  }
+  for (const fs::path& path : {out, report, picture}) {
+    if (!a.overwrite && !path.empty() && fs::exists(path)) throw Error(ErrorKind::Usage, Fault{.place = path.string(), .key = {}, .expected = "exists", .found = {}, .hint = "replace it by --overwrite"});
   }
   const fit::FittedObject object = fit::fit(a.input, {.error = a.error,
                                                       .particles = a.particles,
                                                       .primitives = a.primitives,
                                                       .pieces = a.pieces == "largest" ? fit::Pieces::Largest : fit::Pieces::Refuse,
+                                                      .volume = {.iso = a.iso, .window = a.window, .label = a.label},
                                                       .threads = a.threads});
+  if (!a.picture.empty()) tool::draw_fit(object, a.error, picture);
   io::write_atomically(report, fit::report_json(object.report));
   io::write_atomically(out, fit::object_text(object, fs::path(a.input).filename().string()));
   for (const std::string& warning : object.report.warnings) print(std::cerr, "warning: %s\n", warning.c_str());

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "fit/shapes.h"
 
@@ -62,6 +63,38 @@ TEST(Fit, ClosesSmallHolesAndTurnsTriangles) {
   EXPECT_GT(object.report.repair.closed_area, 0.0);
   EXPECT_TRUE(object.report.repair.turned);
   EXPECT_TRUE(object.report.within);
+}
+
+/// Whether one of the warnings of a coarse fit holds some words.
+testing::AssertionResult warns(const FittedObject& object, const std::string& words) {
+  for (const std::string& warning : object.report.warnings) {
+    if (warning.find(words) != std::string::npos) return testing::AssertionSuccess();
+  }
+  return testing::AssertionFailure() << "none of " << object.report.warnings.size() << " warnings";
+}
+
+TEST(Fit, WarnsOfUnitsThatAreNotMetres) {
+  const FittedObject object = fit(test::saved(test::octahedral_sphere(100.0, 3), "liver"), {.error = 0.1, .particles = 1});
+  EXPECT_TRUE(warns(object, "the data is 346 m across: coordinates count as metres"));
+}
+
+TEST(Fit, WarnsWhereThePrimitivesAreTooFew) {
+  const FittedObject object = fit(test::saved(test::torus(1.0, 0.35, 48, 24), "few"), {.error = 0.05, .particles = 1, .primitives = 2});
+  EXPECT_LE(object.report.primitives, 2U);
+  EXPECT_FALSE(object.report.within);
+  EXPECT_TRUE(warns(object, "more than the 5 % asked with at most 2 primitives"));
+}
+
+TEST(Fit, KeepsTheLargestOfSeveralPieces) {
+  Mesh mesh = test::octahedral_sphere(0.2, 2);
+  const Mesh large = test::octahedral_sphere(0.5, 3);
+  const auto first = static_cast<std::uint32_t>(mesh.position.size());
+  for (const Vec3& p : large.position) mesh.position.push_back(p + Vec3(3.0, 0.0, 0.0));
+  for (const auto& t : large.triangle) mesh.triangle.push_back({t[0] + first, t[1] + first, t[2] + first});
+  const FittedObject object = fit(test::saved(mesh, "two"), {.error = 0.1, .particles = 1, .pieces = Pieces::Largest});
+  EXPECT_EQ(object.report.repair.pieces, 2U);
+  EXPECT_NEAR(object.report.volume, 4.0 / 3.0 * std::numbers::pi * 0.125, 0.05);
+  EXPECT_LT((object.origin - Vec3(3.0, 0.0, 0.0)).norm(), 1e-6);
 }
 
 }  // namespace

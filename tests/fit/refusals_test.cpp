@@ -32,7 +32,7 @@ std::string off(const std::string& vertices, const std::string& faces) {
 const std::string kTetrahedron = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 
 TEST(FitRefuses, FilesThatAreNoMesh) {
-  EXPECT_EQ(message("mesh.stp", "x"), "mesh.stp: expected a mesh in a file .ply, .obj, .off or .stl, found '.stp'");
+  EXPECT_EQ(message("mesh.stp", "x"), "mesh.stp: expected a mesh (.ply, .obj, .off, .stl), points (.xyz, .ply) or a volume (.nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vdb), found '.stp'");
   EXPECT_EQ(message("wrong_header.off", "OFX 3 1 0\n0 0 0\n"), "wrong_header.off: expected a mesh, found text or bytes that are none, or that end early; the extension says how a file is read");
   EXPECT_EQ(message("cut_off.ply", "ply\nformat ascii 1.0\nelement vertex 3\n"), "cut_off.ply: expected 'end_header', found the end of the file");
   EXPECT_EQ(message("empty.off", "OFF\n0 0 0\n"), "empty.off: expected triangles, found none");
@@ -66,6 +66,7 @@ TEST(FitRefuses, SeveralPieces) {
 TEST(FitRefuses, OptionsOutOfRange) {
   EXPECT_EQ(message("any.off", "", {.error = 0.5}), "--error: expected a share of the diagonal from 0.1% to 10%, found 0.500000");
   EXPECT_EQ(message("any.off", "", {.particles = 0}), "--particles: expected a whole number from 1 to 10000, found 0");
+  EXPECT_EQ(message("any.nii", "", {.volume = {.window = std::array{2.0, 1.0}}}), "--window: expected two values, the smaller one first, found 2:1");
   EXPECT_EQ(message("any.off", "", {.primitives = 20000}), "--primitives: expected a whole number from 1 to 10000, found 20000");
 }
 

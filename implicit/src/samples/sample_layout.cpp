@@ -97,8 +97,8 @@ void for_sphere(int m, const Cone& cone, const Use& use) {
 
 class LayoutBuilder {
  public:
-  /// @param near  keeps the seeds whose rays meet it; null: all   @param parts  world poses, with `near`
-  LayoutBuilder(const Skeleton& skeleton, double spacing, std::span<const Pose> parts, const Box* near, SampleLayout& out)
+  /// @param spacing  of each primitive, or one for all   @param near  keeps the seeds whose rays meet it; null: all   @param parts  world poses, with `near`
+  LayoutBuilder(const Skeleton& skeleton, std::span<const double> spacing, std::span<const Pose> parts, const Box* near, SampleLayout& out)
       : skeleton_(skeleton), asked_(spacing), parts_(parts), near_(near), layout_(out) {}
 
   /// @return number of seeds tested
@@ -112,7 +112,7 @@ class LayoutBuilder {
       const double peak = evaluate(kernel, 0.0).value;
       rho_ = skeleton_.iso < peak ? iso_distance(kernel, skeleton_.iso) : 0.5 * kernel.radius;
       const Vec3& size = primitive_->size;
-      spacing_ = asked_ / primitive_->stretch.maxCoeff();
+      spacing_ = asked_[asked_.size() == 1 ? 0 : i] / primitive_->stretch.maxCoeff();
       view_ = view_of(*primitive_);
       switch (primitive_->shape) {
         case ShapeKind::Point: slab(Vec3::Zero()); break;
@@ -428,7 +428,7 @@ class LayoutBuilder {
   }
 
   const Skeleton& skeleton_;
-  double asked_;          ///< spacing on the surface [m]
+  std::span<const double> asked_;  ///< spacing on the surface, of each primitive or of all [m]
   std::span<const Pose> parts_;
   const Box* near_;
   double spacing_ = 0.0;  ///< of the unstretched shape [m]
@@ -456,6 +456,13 @@ void SampleLayout::clear() noexcept {
 SampleLayout make_sample_layout(const Skeleton& skeleton, double spacing) {
   SUPPLE_EXPECTS(spacing > 0.0);
   SampleLayout layout;
+  LayoutBuilder(skeleton, {&spacing, 1}, {}, nullptr, layout).build();
+  return layout;
+}
+
+SampleLayout make_sample_layout(const Skeleton& skeleton, std::span<const double> spacing) {
+  SUPPLE_EXPECTS(spacing.size() == skeleton.primitive.size() && std::all_of(spacing.begin(), spacing.end(), [](double s) { return s > 0.0; }));
+  SampleLayout layout;
   LayoutBuilder(skeleton, spacing, {}, nullptr, layout).build();
   return layout;
 }
@@ -463,7 +470,7 @@ SampleLayout make_sample_layout(const Skeleton& skeleton, double spacing) {
 std::size_t make_sample_layout(const Skeleton& skeleton, double spacing, std::span<const Pose> parts, const Box& near,
                                SampleLayout& out) {
   SUPPLE_EXPECTS(spacing > 0.0 && parts.size() == skeleton.part_count);
-  return LayoutBuilder(skeleton, spacing, parts, &near, out).build();
+  return LayoutBuilder(skeleton, {&spacing, 1}, parts, &near, out).build();
 }
 
 }  // namespace supple::implicit

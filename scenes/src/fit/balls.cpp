@@ -10,15 +10,15 @@ namespace {
 
 constexpr std::size_t kBlock = 256;
 
-double touching_radius(const SurfaceSamples& surface, const PointGrid& grid, std::size_t k, double side, double most, double slack) {
+double touching_radius(const SurfaceSamples& surface, const PointTree& tree, std::size_t k, double side, double most, double slack) {
   const Vec3& p = surface.position[k];
   const Vec3 inward = side * surface.normal[k];
   double radius = most;
   constexpr int kMostSteps = 40;
   for (int step = 0; step < kMostSteps; ++step) {
     const Vec3 centre = p + radius * inward;
-    const std::uint32_t deepest = grid.nearest(centre, radius - slack);
-    if (deepest == PointGrid::kNone) break;
+    const std::uint32_t deepest = tree.nearest(centre, radius - slack);
+    if (deepest == PointTree::kNone) break;
     const Vec3 toward = surface.position[deepest] - p;
     const double smaller = toward.squaredNorm() / (2.0 * toward.dot(inward));  // > 0, as the point is inside the ball
     if (!(smaller < radius)) break;
@@ -29,15 +29,15 @@ double touching_radius(const SurfaceSamples& surface, const PointGrid& grid, std
 
 }  // namespace
 
-std::vector<double> touching_radii(const SurfaceSamples& surface, const PointGrid& grid, double side, double most, double slack, const Executor& executor) {
+std::vector<double> touching_radii(const SurfaceSamples& surface, const PointTree& tree, double side, double most, double slack, const Executor& executor) {
   std::vector<double> out(surface.position.size());
   executor.for_blocks(out.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) out[k] = touching_radius(surface, grid, k, side, most, slack);
+    for (std::size_t k = begin; k < end; ++k) out[k] = touching_radius(surface, tree, k, side, most, slack);
   });
   return out;
 }
 
-std::vector<Ball> cover_surface(const SurfaceSamples& surface, const PointGrid& grid, std::span<const double> radius, std::span<const std::uint32_t> wanted, double reach) {
+std::vector<Ball> cover_surface(const SurfaceSamples& surface, const PointTree& tree, std::span<const double> radius, std::span<const std::uint32_t> wanted, double reach) {
   const std::size_t n = surface.position.size();
   std::vector<char> open(n, 0);
   for (const std::uint32_t k : wanted) open[k] = 1;
@@ -45,7 +45,7 @@ std::vector<Ball> cover_surface(const SurfaceSamples& surface, const PointGrid& 
   std::vector<std::uint32_t> near;
   const auto gain = [&](std::uint32_t k) {
     const Ball ball = ball_at(k);
-    grid.within(ball.centre, ball.radius + reach, near);
+    tree.within(ball.centre, ball.radius + reach, near);
     return std::count_if(near.begin(), near.end(), [&](std::uint32_t s) { return open[s] != 0; });
   };
   // Gains only fall, so one that is still the largest when it is counted anew is the largest of all.
@@ -81,12 +81,12 @@ std::vector<Ball> cover_surface(const SurfaceSamples& surface, const PointGrid& 
 
 void cover_inside(const Surroundings& around, double most, std::vector<Ball>& balls) {
   if (around.inside.empty()) return;
-  const PointGrid grid(around.inside, around.step);
+  const PointTree tree(around.inside);
   std::vector<char> open(around.inside.size(), 1);
   std::vector<std::uint32_t> near;
   const auto close = [&](const Ball& ball) {
     constexpr double kCovered = 0.9;  // of the radius of small balls; of large ones what lies half a step inside
-    grid.within(ball.centre, std::max(kCovered * ball.radius, ball.radius - 0.5 * around.step), near);
+    tree.within(ball.centre, std::max(kCovered * ball.radius, ball.radius - 0.5 * around.step), near);
     for (const std::uint32_t k : near) open[k] = 0;
   };
   for (const Ball& ball : balls) close(ball);

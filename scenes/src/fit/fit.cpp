@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "fit/balls.h"
+#include "fit/data.h"
 #include "fit/measure.h"
 #include "fit/packing.h"
 #include "fit/solve.h"
@@ -29,6 +30,9 @@ void expect_range(const char* option, bool good, const char* expected, const std
 void check(const FitOptions& options) {
   expect_range("--error", options.error >= 1e-3 && options.error <= 0.1, "expected a share of the diagonal from 0.1% to 10%", std::to_string(options.error));
   expect_range("--particles", options.particles >= 1 && options.particles <= 10000, "expected a whole number from 1 to 10000", std::to_string(options.particles));
+  const auto& window = options.volume.window;
+  expect_range("--window", !window || (*window)[0] < (*window)[1], "expected two values, the smaller one first",
+               window ? short_number((*window)[0]) + ':' + short_number((*window)[1]) : "");
   expect_range("--primitives", options.primitives >= 1 && options.primitives <= 10000, "expected a whole number from 1 to 10000", std::to_string(options.primitives));
 }
 
@@ -54,19 +58,19 @@ long genus_of(const MeshReport& mesh) { return static_cast<long>(mesh.components
 /// Samples, distances and the balls that touch the surface; all lengths over the diagonal.
 struct Data {
   Data(const Mesh& given, double most, double error, const Executor& executor)
-      : mesh(given), tree(given), surface(sample_surface(given, kSamples)), grid(surface.position, surface.spacing), largest_ball(most), genus(genus_of(inspect(given))) {
+      : mesh(given), tree(given), surface(sample_surface(given, kSamples)), points(surface.position), largest_ball(most), genus(genus_of(inspect(given))) {
     constexpr double kStep = 1.0 / 48.0;
     around = sample_surroundings(mesh, tree, kStep, executor);
     constexpr double kSlack = 0.2, kBeforeHollow = 2.0;  // balls larger than a hollow blend across it
-    radius = touching_radii(surface, grid, -1.0, most, kSlack * error, executor);
-    const std::vector<double> outside = touching_radii(surface, grid, 1.0, most, kSlack * error, executor);
+    radius = touching_radii(surface, points, -1.0, most, kSlack * error, executor);
+    const std::vector<double> outside = touching_radii(surface, points, 1.0, most, kSlack * error, executor);
     for (std::size_t k = 0; k < radius.size(); ++k) radius[k] = std::min(radius[k], std::max(kBeforeHollow * outside[k], error));
   }
 
   const Mesh& mesh;
   SurfaceTree tree;
   SurfaceSamples surface;
-  PointGrid grid;
+  PointTree points;
   Surroundings around;
   std::vector<double> radius;  ///< of the largest ball at a sample, from inside and with respect to hollows outside
   double largest_ball;
@@ -208,7 +212,7 @@ void divide(std::vector<Blob>& blobs, const Data& data, const implicit::Field& f
   for (std::size_t k = 0; k < blobs.size(); ++k) {
     if (large[k] == 0) out.push_back(blobs[k]);
   }
-  const std::vector<Blob> parts = blobs_of(cover_surface(data.surface, data.grid, radius, wanted, reach));
+  const std::vector<Blob> parts = blobs_of(cover_surface(data.surface, data.points, radius, wanted, reach));
   out.insert(out.end(), parts.begin(), parts.end());
   blobs = std::move(out);
 }
@@ -226,7 +230,7 @@ Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executo
   Targets targets = targets_of(data);
   std::vector<std::uint32_t> all(data.surface.position.size());
   std::iota(all.begin(), all.end(), 0U);
-  std::vector<Ball> balls = cover_surface(data.surface, data.grid, data.radius, all, kReach * options.error);
+  std::vector<Ball> balls = cover_surface(data.surface, data.points, data.radius, all, kReach * options.error);
   cover_inside(data.around, data.largest_ball, balls);
   if (balls.size() > options.primitives) balls.resize(options.primitives);
   Skeleton out{blobs_of(balls), std::min(0.5 * options.error, 1.0 / 128.0)};
@@ -247,7 +251,7 @@ Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executo
     for (const Vec3& p : faults.outside) targets.outside.add(p, weight(p));
     reach = std::max(0.7 * reach, kLeastReach * options.error);
     divide(out.blobs, data, field, faults.outside, reach);
-    std::vector<Ball> more = cover_surface(data.surface, data.grid, data.radius, faults.missed, reach);
+    std::vector<Ball> more = cover_surface(data.surface, data.points, data.radius, faults.missed, reach);
     for (const Vec3& p : faults.inside) more.push_back({p, std::min(data.tree.distance(p), data.largest_ball)});
     more.resize(std::min<std::size_t>(more.size(), options.primitives - std::min<std::size_t>(options.primitives, out.blobs.size())));
     const std::vector<Blob> added = blobs_of(more);
@@ -276,11 +280,20 @@ void warn_of_units(FitReport& report) {
   report.warnings.emplace_back(text.data());
 }
 
+/// Of surfaces that are not quite the data's.
+void warn_of_source(FitReport& report) {
+  constexpr double kFar = 0.01;
+  if (report.repair.points_rms > kFar) {
+    report.warnings.push_back("the surface through the points misses them by " + short_number(100.0 * report.repair.points_rms) + " % of the diagonal (RMS): normals may be wrong, or gaps too large");
+  }
+  if (report.repair.cut) report.warnings.emplace_back("the border of the volume cuts what lies inside, and closes the surface there");
+}
+
 /// Primitives hang on the particle whose share they lie in.
 void hang(FittedObject& object, const Skeleton& skeleton, const Packing& packing, const Surroundings& around, const Frame& frame) {
-  const PointGrid grid(around.inside, around.step);
+  const PointTree tree(around.inside);
   for (const Blob& blob : skeleton.blobs) {
-    const std::uint32_t particle = packing.share[grid.nearest(blob.centre)];
+    const std::uint32_t particle = packing.share[tree.nearest(blob.centre)];
     object.primitives.push_back({particle, frame.diagonal * (blob.centre - packing.particle[particle]), frame.diagonal * blob.axes, blob.turn});
   }
   std::stable_sort(object.primitives.begin(), object.primitives.end(), [](const auto& a, const auto& b) { return a.particle < b.particle; });
@@ -297,8 +310,12 @@ void report_errors(FittedObject& object, const Data& data, const Skeleton& skele
   report.pieces_out = out.components;
   report.volume_error = out.volume / in.volume - 1.0;
   const double within = 0.05 * options.error;
-  report.from_data = measure(data.mesh, object.surface, SurfaceTree(object.surface), within, executor);
+  const SurfaceTree fitted(object.surface);
+  report.from_data = measure(data.mesh, object.surface, fitted, within, executor);
   report.to_data = measure(object.surface, data.mesh, data.tree, within, executor);
+  object.data = data.mesh;
+  object.data.columns = {{"distance", distances(data.mesh.position, fitted, executor)}};
+  object.surface.columns = {{"distance", distances(object.surface.position, data.tree, executor)}};
   report.within = report.two_sided() <= options.error;
   if (!report.within) {
     std::array<char, 200> text{};
@@ -320,12 +337,13 @@ FittedObject fit(const std::filesystem::path& file, const FitOptions& options) {
   const Executor executor(options.threads);
   FittedObject object;
   FitReport& report = object.report;
-  Mesh mesh = read_surface(file, options.pieces, report.repair);
+  Mesh mesh = read_surface(file, options, report.repair, executor);
   const Frame frame = normalise(mesh);
   report.diagonal = frame.diagonal;
   const double volume = inspect(mesh).volume;
   report.volume = volume * frame.diagonal * frame.diagonal * frame.diagonal;
   warn_of_units(report);
+  warn_of_source(report);
   const double spacing = math::pow(volume / options.particles, 1.0 / 3.0);
   constexpr double kLargestBall = 1.25;  // of the spacing: a primitive moves with one particle
   const Data data(mesh, std::min(0.5, kLargestBall * spacing), options.error, executor);
@@ -341,7 +359,10 @@ FittedObject fit(const std::filesystem::path& file, const FitOptions& options) {
   for (const Vec3& p : packing.particle) object.particles.push_back(frame.diagonal * (p - middle));
   object.bonds = packing.bond;
   report_errors(object, data, skeleton, options, executor);
-  for (Vec3& p : object.surface.position) p = frame.diagonal * (p - middle);
+  for (Mesh* one : {&object.surface, &object.data}) {
+    for (Vec3& p : one->position) p = frame.diagonal * (p - middle);
+    for (double& d : one->columns.front().values) d *= frame.diagonal;
+  }
   report.primitives = object.primitives.size();
   report.particles = object.particles.size();
   report.bonds = object.bonds.size();

@@ -69,6 +69,8 @@ std::string report_json(const FitReport& r) {
   nlohmann::ordered_json out;
   out["diagonal"] = r.diagonal;
   out["repair"] = {{"vertices", r.repair.vertices}, {"triangles", r.repair.triangles}, {"holes", r.repair.holes}, {"closed_area", r.repair.closed_area}, {"pieces", r.repair.pieces}, {"turned", r.repair.turned}};
+  if (r.repair.points > 0) out["points"] = {{"number", r.repair.points}, {"normals_given", r.repair.normals_given}, {"rms", r.repair.points_rms}};
+  if (r.repair.voxels > 0) out["volume_data"] = {{"voxels", r.repair.voxels}, {"cavities", r.repair.cavities}, {"cut", r.repair.cut}};
   out["from_data"] = distance(r.from_data);
   out["to_data"] = distance(r.to_data);
   out["two_sided"] = r.two_sided();
@@ -88,6 +90,8 @@ std::string report_json(const FitReport& r) {
 
 std::string report_text(const FitReport& r) {
   std::string out;
+  if (r.repair.points > 0) put(out, "points:     %zu, %s normals; RMS %.3g %% to the surface through them\n", r.repair.points, r.repair.normals_given ? "with" : "without", 100.0 * r.repair.points_rms);
+  if (r.repair.voxels > 0) put(out, "voxels:     %zu, %s, %s filled\n", r.repair.voxels, counted(r.repair.pieces, "piece").c_str(), counted(r.repair.cavities, "cavity", "cavities").c_str());
   put(out, "data:       %s, %.4g m across, %s closed\n", counted(r.repair.triangles, "triangle").c_str(), r.diagonal, counted(r.repair.holes, "hole").c_str());
   put(out, "primitives: %zu\nparticles:  %zu, %s%s\n", r.primitives, r.particles, counted(r.bonds, "bond").c_str(), r.rigid ? ", no free modes beyond six" : ", in parts that nothing joins");
   put(out, "distance:   RMS %.3g %%, largest %.3g %% from the data; RMS %.3g %%, largest %.3g %% to it (of the diagonal)\n", 100.0 * r.from_data.rms, 100.0 * r.from_data.largest, 100.0 * r.to_data.rms,

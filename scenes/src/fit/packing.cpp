@@ -6,9 +6,8 @@
 #include <map>
 #include <numeric>
 
-#include "fit/point_grid.h"
+#include "fit/point_tree.h"
 #include "supple/core/interrupt.h"
-#include "supple/core/math.h"
 
 namespace supple::fit {
 namespace {
@@ -33,10 +32,10 @@ std::vector<Vec3> far_points(const std::vector<Vec3>& points, std::size_t count)
   return out;
 }
 
-void assign_shares(const std::vector<Vec3>& points, double spacing, Packing& packing, const Executor& executor) {
-  const PointGrid grid(packing.particle, spacing);
+void assign_shares(const std::vector<Vec3>& points, Packing& packing, const Executor& executor) {
+  const PointTree tree(packing.particle);
   executor.for_blocks(points.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) packing.share[k] = grid.nearest(points[k]);
+    for (std::size_t k = begin; k < end; ++k) packing.share[k] = tree.nearest(points[k]);
   });
 }
 
@@ -59,12 +58,12 @@ std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i) {
 }
 
 void add_bonds(const Surroundings& around, Packing& packing) {
-  const PointGrid grid(around.inside, around.step);
+  const PointTree tree(around.inside);
   std::map<std::array<std::uint32_t, 2>, int> faces;
   std::vector<std::uint32_t> near;
   for (std::uint32_t k = 0; k < around.inside.size(); ++k) {
     constexpr double kNext = 1.1;  // of the step: the six points beside
-    grid.within(around.inside[k], kNext * around.step, near);
+    tree.within(around.inside[k], kNext * around.step, near);
     for (const std::uint32_t other : near) {
       const auto [a, b] = std::minmax(packing.share[k], packing.share[other]);
       if (other > k && a != b) ++faces[{a, b}];
@@ -119,14 +118,13 @@ Packing pack_inside(const Surroundings& around, std::size_t count, const Executo
   count = std::min(count, points.size());
   out.particle = far_points(points, count);
   out.share.resize(points.size());
-  const double spacing = around.step * math::pow(static_cast<double>(points.size()) / static_cast<double>(count), 1.0 / 3.0);
   constexpr int kSweeps = 40;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     heed_scope();
-    assign_shares(points, spacing, out, executor);
+    assign_shares(points, out, executor);
     centre(points, out);
   }
-  assign_shares(points, spacing, out, executor);
+  assign_shares(points, out, executor);
   add_bonds(around, out);
   out.connected = is_connected(out);
   return out;

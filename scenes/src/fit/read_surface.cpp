@@ -14,13 +14,15 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <map>
 #include <sstream>
 
+#include "fit/cloud.h"
+#include "fit/data.h"
 #include "fit/surface.h"
+#include "fit/volume.h"
 #include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
@@ -35,10 +37,6 @@ using Point = Kernel::Point_3;
 using SurfaceMesh = CGAL::Surface_mesh<Point>;
 
 constexpr double kMostClosed = 0.1;  // area of triangles that close holes, over the area of all
-
-[[noreturn]] void refuse(const std::filesystem::path& file, std::string expected, std::string found, std::string hint, ErrorKind kind = ErrorKind::Scene) {
-  throw Error(kind, Fault{.place = file.string(), .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = std::move(hint)});
-}
 
 std::string text_of(const Point& p) {
   std::array<char, 96> text{};
@@ -79,12 +77,7 @@ Soup read_by_cgal(const std::filesystem::path& file, bool off) {
 }
 
 Soup read_soup(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  constexpr std::array kKnown{".ply", ".obj", ".off", ".stl"};
-  if (std::find(kKnown.begin(), kKnown.end(), extension) == kKnown.end()) {
-    refuse(file, "expected a mesh in a file .ply, .obj, .off or .stl", extension.empty() ? "no extension" : '\'' + extension + '\'', "", ErrorKind::Usage);
-  }
+  const std::string extension = extension_of(file);
   Soup soup;
   if (extension == ".off" || extension == ".stl") {
     soup = read_by_cgal(file, extension == ".off");
@@ -93,7 +86,7 @@ Soup read_soup(const std::filesystem::path& file) {
     for (const Vec3& p : mesh.position) soup.points.emplace_back(p.x(), p.y(), p.z());
     for (const auto& t : mesh.triangle) soup.faces.push_back({t[0], t[1], t[2]});
   }
-  if (soup.faces.empty()) refuse(file, "expected triangles", "none", "");
+  if (soup.faces.empty() && (soup.points.empty() || extension_of(file) != ".ply")) refuse(file, "expected triangles", "none", "");
   for (const std::vector<std::size_t>& face : soup.faces) {
     for (const std::size_t corner : face) {
       if (corner >= soup.points.size()) refuse(file, "expected corners among the " + counted(soup.points.size(), "vertex", "vertices"), std::to_string(corner), "");
@@ -144,10 +137,11 @@ void close_holes(const std::filesystem::path& file, SurfaceMesh& mesh, Repair& r
 
 void keep_pieces(const std::filesystem::path& file, SurfaceMesh& mesh, Pieces pieces, Repair& repair) {
   const auto [piece, fresh] = mesh.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:piece", 0);
-  repair.pieces = pmp::connected_components(mesh, piece);
-  if (repair.pieces < 2) return;
-  if (pieces == Pieces::Refuse) refuse(file, "expected a mesh in one piece", std::to_string(repair.pieces) + " pieces", "choose the largest by --pieces largest");
-  std::vector<double> volume(repair.pieces, 0.0);
+  const std::size_t count = pmp::connected_components(mesh, piece);
+  repair.pieces = std::max(repair.pieces, count);  // what a volume had counts
+  if (count < 2) return;
+  if (pieces == Pieces::Refuse) refuse(file, "expected a mesh in one piece", std::to_string(count) + " pieces", "choose the largest by --pieces largest");
+  std::vector<double> volume(count, 0.0);
   for (const SurfaceMesh::Face_index f : mesh.faces()) {
     const auto h = mesh.halfedge(f);
     const Point a = mesh.point(mesh.source(h)), b = mesh.point(mesh.target(h)), c = mesh.point(mesh.target(mesh.next(h)));
@@ -169,10 +163,32 @@ Mesh plain_mesh(const SurfaceMesh& mesh) {
   return out;
 }
 
+Soup soup_of(const Mesh& mesh) {
+  Soup out;
+  for (const Vec3& p : mesh.position) out.points.emplace_back(p.x(), p.y(), p.z());
+  for (const auto& t : mesh.triangle) out.faces.push_back({t[0], t[1], t[2]});
+  return out;
+}
+
+/// The surface of the data, as it is.
+Soup read_data(const std::filesystem::path& file, const FitOptions& options, Repair& repair, const Executor& executor) {
+  const DataKind kind = kind_of(file);
+  if (kind != DataKind::Volume && options.volume.given()) refuse(file, "expected a volume, of which --iso, --window and --label choose a part", "another kind of data", "", ErrorKind::Usage);
+  if (kind == DataKind::Volume) {
+    Volume volume = extension_of(file) == ".vdb" ? read_vdb(file) : read_image(file);
+    return soup_of(surface_of_volume(file, std::move(volume), options, repair, executor));
+  }
+  if (kind == DataKind::Mesh) {
+    Soup soup = read_soup(file);
+    if (!soup.faces.empty()) return soup;
+  }
+  return soup_of(surface_through_points(file, options.error, repair));
+}
+
 }  // namespace
 
-Mesh read_surface(const std::filesystem::path& file, Pieces pieces, Repair& repair) {
-  Soup soup = read_soup(file);
+Mesh read_surface(const std::filesystem::path& file, const FitOptions& options, Repair& repair, const Executor& executor) {
+  Soup soup = read_data(file, options, repair, executor);
   pmp::repair_polygon_soup(soup.points, soup.faces);
   expect_two_faces_at_edges(file, soup);
   pmp::orient_polygon_soup(soup.points, soup.faces);
@@ -181,7 +197,7 @@ Mesh read_surface(const std::filesystem::path& file, Pieces pieces, Repair& repa
   pmp::polygon_soup_to_polygon_mesh(soup.points, soup.faces, mesh);
   pmp::triangulate_faces(mesh);
   close_holes(file, mesh, repair);
-  keep_pieces(file, mesh, pieces, repair);
+  keep_pieces(file, mesh, options.pieces, repair);
   repair.turned = !pmp::is_outward_oriented(mesh);
   if (repair.turned) pmp::reverse_face_orientations(mesh);
   repair.vertices = mesh.number_of_vertices();

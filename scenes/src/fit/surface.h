@@ -5,12 +5,13 @@
 #include <filesystem>
 #include <memory>
 
+#include "supple/core/executor.h"
 #include "supple/fit/fit.h"
 
 namespace supple::fit {
 
-/// A closed mesh without vertex normals, oriented outwards. @throws as `fit`
-[[nodiscard]] Mesh read_surface(const std::filesystem::path& file, Pieces pieces, Repair& repair);
+/// The surface of data of any kind: a closed mesh without vertex normals, oriented outwards. @throws as `fit`
+[[nodiscard]] Mesh read_surface(const std::filesystem::path& file, const FitOptions& options, Repair& repair, const Executor& executor);
 
 /// Distances to a closed mesh, by a tree of its triangles.
 class SurfaceTree {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <span>
 
 #include "model/model_skeleton.h"
 #include "supple/core/error.h"
@@ -358,18 +360,32 @@ double seeds_of(const implicit::Primitive& primitive, double iso, double spacing
   return 2.0 * (side.x() * side.y() + side.y() * side.z() + side.z() * side.x());
 }
 
-double count_seeds(const ObjectModel& object, double spacing) {
+/// Spacing of the samples of each primitive: that of the scene, or a sixth of the thinnest of the primitive and the obstacles, which have no samples. What is
+/// thin on another object is seen by that object's own samples.
+std::vector<double> sample_spacings(const Scene& scene, const Model& model, const ObjectModel& object) {
+  double solids = std::numeric_limits<double>::infinity();
+  for (const FixedBody& body : model.fixed) solids = std::min(solids, body.iso_radius);
+  std::vector<double> out;
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    const double thinnest = std::min(iso_radius(primitive, object.skeleton.iso), solids);
+    out.push_back(scene.contact.sample_spacing.value_or(2.0 * thinnest / kSamplesAcross));
+  }
+  return out;
+}
+
+double count_seeds(const ObjectModel& object, std::span<const double> spacing) {
   double seeds = 0.0;
-  for (const implicit::Primitive& primitive : object.skeleton.primitive) seeds += seeds_of(primitive, object.skeleton.iso, spacing);
+  for (std::size_t k = 0; k < spacing.size(); ++k) seeds += seeds_of(object.skeleton.primitive[k], object.skeleton.iso, spacing[k]);
   return seeds;
 }
 
-/// Rows of seeds have numbers that fit an int, with room to spare.
-bool rows_fit(const ObjectModel& object, double spacing) {
+/// Rows of seeds have numbers that fit an int, with room to spare. @return the first primitive where they do not
+std::optional<std::size_t> too_long_row(const ObjectModel& object, std::span<const double> spacing) {
   constexpr double kMostInRow = 5e5;
-  return std::all_of(object.skeleton.primitive.begin(), object.skeleton.primitive.end(), [spacing](const implicit::Primitive& primitive) {
-    return implicit::support_box(primitive).extent().maxCoeff() <= kMostInRow * spacing;
-  });
+  for (std::size_t k = 0; k < spacing.size(); ++k) {
+    if (!(implicit::support_box(object.skeleton.primitive[k]).extent().maxCoeff() <= kMostInRow * spacing[k])) return k;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -488,6 +504,7 @@ void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, Model
   }
   find_bonded(model);
   const auto count = static_cast<std::uint32_t>(model.objects.size());
+  std::vector<std::vector<double>> spacing(count);  // of the samples, by object and primitive
   std::vector<std::uint8_t> convex;
   for (const ObjectModel& object : model.objects) convex.push_back(only_convex(object) ? 1 : 0);
   for (const FixedBody& body : model.fixed) convex.push_back(body.field().core_point(Vec3::Zero()) ? 1 : 0);
@@ -508,21 +525,20 @@ void build_contact(const Scene& scene, MemoryBudget& budget, Model& model, Model
     const double sticks = (accuracy_of(scene) ? 0.5 : 1.0) * stick_frequency(object, model.particles, model.reaction.stick);
     model.contact_frequency = std::max(model.contact_frequency, std::hypot(contact_frequency(object, model.particles), sticks));
     if (!needs_samples) continue;
-    double thinnest = object.iso_radius;  // obstacles have no samples: those of the object see the thinnest of their shapes
-    for (const FixedBody& body : model.fixed) thinnest = std::min(thinnest, body.iso_radius);
-    const double spacing = scene.contact.sample_spacing.value_or(2.0 * thinnest / kSamplesAcross);
-    if (!rows_fit(object, spacing)) {
-      faults.add("contact.sample_spacing", "expected at most 500000 surface samples in a row", "more on '" + object.name + "', at a spacing of " + short_text(spacing) + " m",
+    spacing[i] = sample_spacings(scene, model, object);
+    if (const auto row = too_long_row(object, spacing[i])) {
+      faults.add("contact.sample_spacing", "expected at most 500000 surface samples in a row", "more on '" + object.name + "', at a spacing of " + short_text(spacing[i][*row]) + " m",
                  "use a larger sample_spacing, or shorter or thicker parts");
       continue;
     }
     budget.add({.what = Counted::Samples, .key = scene.contact.sample_spacing ? "contact.sample_spacing" : "objects." + object.name + ".skeleton",
-                .number = count_seeds(object, spacing)});
-    object.sample_spacing = spacing;
+                .number = count_seeds(object, spacing[i])});
+    object.sample_spacing = *std::max_element(spacing[i].begin(), spacing[i].end());
   }
   budget.expect();
-  for (ObjectModel& object : model.objects) {
-    if (object.sample_spacing > 0.0) object.samples = implicit::make_sample_layout(object.skeleton, object.sample_spacing);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    ObjectModel& object = model.objects[i];
+    if (object.sample_spacing > 0.0) object.samples = implicit::make_sample_layout(object.skeleton, spacing[i]);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -139,6 +140,18 @@ TEST(SampleLayout, SeedsStandForAtMostTheSpacingSquared) {
     }
   }
   EXPECT_THROW(static_cast<void>(make_sample_layout(Skeleton{}, 0.0)), ContractViolation);
+}
+
+TEST(SampleLayout, TakesASpacingForEachPrimitive) {
+  // A ball of a tenth of the size has as many seeds at a tenth of the spacing, and a hundredth of them at the same.
+  const Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}, {wyvill_point(0.1), Vec3(2.0, 0.0, 0.0)}});
+  const auto seeds = [](const SampleLayout& layout, std::uint32_t primitive) { return std::count(layout.primitive.begin(), layout.primitive.end(), primitive); };
+  const SampleLayout same = make_sample_layout(body.skeleton, 0.01), own = make_sample_layout(body.skeleton, std::array{0.1, 0.01});
+  EXPECT_EQ(seeds(own, 0), seeds(own, 1));
+  EXPECT_EQ(seeds(own, 1), seeds(same, 1));
+  EXPECT_GT(seeds(same, 0), 50 * seeds(own, 0));
+  EXPECT_EQ(make_sample_layout(body.skeleton, std::array{0.01, 0.01}).direction, same.direction);
+  EXPECT_THROW(static_cast<void>(make_sample_layout(body.skeleton, std::array{0.01})), ContractViolation);
 }
 
 TEST(SampleLayout, IsSymmetricAboutThePlanesOfAPlate) {

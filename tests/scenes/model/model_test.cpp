@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -483,6 +484,20 @@ TEST(Seeds, AreMadeOnlyForWhatIsNotAllConvex) {
   EXPECT_EQ(seeds(kBall + ring + "pairs: [{objects: [ball, ring], collide: false}]\n"), 0u);
   EXPECT_GT(seeds(pair + "ground: {}\n"), 0u);
   EXPECT_EQ(seeds(pair + "    separate: true\nground: {}\n"), 0u);
+}
+
+TEST(Seeds, AreAsFineAsTheirPrimitiveIsThick) {
+  const auto seeds = [](const std::string& obstacles) {
+    const Model model = model_of(std::string(kHead) + "  - name: a\n    particles: {arrange: line, count: 2, spacing: 1}\n    contact: {}\n" +
+                                 "    skeleton: [{shape: point, kernel: {radius: 0.5}, particles: [0]}, {shape: point, kernel: {radius: 0.05}, particles: [1]}]\nground: {}\n" + obstacles);
+    std::array<long, 2> count{};
+    for (const std::uint32_t primitive : model.objects[0].samples.primitive) ++count[primitive];
+    return count;
+  };
+  const auto [thick, thin] = seeds("");
+  EXPECT_EQ(thick, thin);
+  // Obstacles have no samples: those of all primitives see them.
+  EXPECT_GT(seeds("obstacles: [{name: bar, shape: implicit, at: [0, 0, 3], skeleton: [{shape: segment, half_length: 1, kernel: {radius: 0.05}}]}]\n")[0], 50 * thick);
 }
 
 TEST(Skeletons, GoToTheParticlesNamed) {

@@ -35,6 +35,9 @@ struct SampleLayout {
 /// around plates, boxes, discs and segments. At least 32 per primitive. @pre spacing > 0
 [[nodiscard]] SampleLayout make_sample_layout(const Skeleton& skeleton, double spacing);
 
+/// The same with a spacing for each primitive [m], shape [primitives]. @pre all > 0
+[[nodiscard]] SampleLayout make_sample_layout(const Skeleton& skeleton, std::span<const double> spacing);
+
 /// The same seeds, but only those whose rays meet a box; replaces the content of `out`, keeps its capacity.
 /// @param parts  world poses, shape [part_count]   @param near  world [m]
 /// @return number of seeds that were tested: for points, plates, boxes and ellipsoids only those around the box

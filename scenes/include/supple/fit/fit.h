@@ -1,11 +1,12 @@
 /// @file supple/fit/fit.h
-/// Deformable objects from closed triangle meshes: particles, bonds and skeleton of an object whose surface lies within an error of the data. An
+/// Deformable objects from triangle meshes, points and volumes: particles, bonds and skeleton of an object whose surface lies within an error of the data. An
 /// optional component. It uses CGAL, whose packages are under the GPL, and so is a program that links it.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,11 +20,21 @@ enum class Pieces : std::uint8_t {
   Largest,  ///< the one with the largest volume is fitted
 };
 
+/// What lies inside the surface of a volume: one of these. Level sets of OpenVDB need none.
+struct VolumeOptions {
+  std::optional<double> iso{};                   ///< values above
+  std::optional<std::array<double, 2>> window{}; ///< values between two
+  std::optional<std::uint32_t> label{};          ///< voxels of this number, below 2^24
+
+  [[nodiscard]] bool given() const { return iso || window || label; }
+};
+
 struct FitOptions {
   double error = 0.01;           ///< largest distance between the surfaces, either way, over the diagonal of the data's box; in [1e-3, 0.1]
   std::uint32_t particles = 200; ///< of the object; in [1, 10000]
   std::uint32_t primitives = 2000;  ///< at most; in [1, 10000]
   Pieces pieces = Pieces::Refuse;
+  VolumeOptions volume{};
   int threads = 0;               ///< 0: all of the machine; does not change the result
 };
 
@@ -35,6 +46,12 @@ struct Repair {
   double closed_area = 0.0;      ///< of the triangles that close them, over the area of all
   std::size_t pieces = 1;        ///< in the data
   bool turned = false;           ///< triangles were turned to look outwards
+  std::size_t points = 0;        ///< of data that has no triangles
+  bool normals_given = false;    ///< with these
+  double points_rms = 0.0;       ///< distance of the points used to the surface through them, over the diagonal
+  std::size_t voxels = 0;        ///< of volumes
+  std::size_t cavities = 0;      ///< of volumes, filled
+  bool cut = false;              ///< the border of the volume cuts what lies inside
 };
 
 /// Distances from the points of one surface to the other, over the diagonal of the data's box.
@@ -74,16 +91,18 @@ struct FittedObject {
   std::vector<Vec3> particles;                          ///< centres of equal shares of the volume [m]
   std::vector<std::array<std::uint32_t, 2>> bonds;      ///< between particles whose shares have a common face, sorted
   std::vector<FittedPrimitive> primitives;              ///< sorted by particle
-  Mesh surface;                                         ///< fitted [m]
+  Mesh surface;                                         ///< fitted [m], with the column `distance` to the data [m]
+  Mesh data;                                            ///< mended [m], with the column `distance` to the fitted surface [m]
   FitReport report;
 };
 
-/// Fits an object to a closed mesh: balls of the medial axis that cover the surface (Ma et al. 2012), moved and resized by least squares of field and
+/// Fits an object to data: balls of the medial axis that cover the surface (Ma et al. 2012), moved and resized by least squares of field and
 /// normals on samples (Levenberg 1944; Marquardt 1963), more of them where the error is too large, fewer where none is missed; particles by centroidal
 /// packing (Lloyd 1982). The result depends on data and options alone.
-/// @param file  PLY, OBJ, OFF or STL [m]. Holes are closed where that adds less than a tenth of the area.
-/// @throws Error{Usage} for options out of range, Error{Io} for a file that is absent, Error{Scene} for a mesh that is empty, open beyond repair, joins more
-/// than two triangles at an edge, or has several pieces that are not asked for
+/// @param file  a mesh (PLY, OBJ, OFF, STL) or points (XYZ, PLY) [m], or a volume (NIfTI, NRRD, MetaImage: mm unless the file says otherwise; OpenVDB: m). Holes
+/// are closed where that adds less than a tenth of the area.
+/// @throws Error{Usage} for options out of range, Error{Io} for a file that is absent or ends early, Error{Limit} for 4e8 voxels and more, Error{Scene} for data
+/// that is empty, open beyond repair, joins more than two triangles at an edge, or has several pieces that are not asked for
 [[nodiscard]] FittedObject fit(const std::filesystem::path& file, const FitOptions& options = {});
 
 /// Keys of an object for scene files: particles, skeleton, material and contact.

@@ -37,7 +37,7 @@ struct ObjectModel {
   std::uint32_t last = 0;
   implicit::Skeleton skeleton;            ///< empty: the object has no surface
   implicit::SampleLayout samples;         ///< empty unless it can touch another body and one of the two is not convex
-  double sample_spacing = 0.0;            ///< largest distance of samples where bodies are alone [m]
+  double sample_spacing = 0.0;            ///< largest distance of samples where bodies are alone, of all primitives [m]
   collision::ContactMaterial material;
   bool collides = false;                  ///< has `contact` and a surface
   bool hinges_join = false;               ///< laws also act between two hinges

@@ -1,0 +1,45 @@
+#include "fit/data.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdio>
+#include <string_view>
+
+namespace supple::fit {
+
+std::string extension_of(const std::filesystem::path& file) {
+  const auto lower = [](std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return text;
+  };
+  const std::string last = lower(file.extension().string());
+  return last == ".gz" ? lower(file.stem().extension().string()) + last : last;
+}
+
+DataKind kind_of(const std::filesystem::path& file) {
+  constexpr std::array<std::string_view, 4> kMeshes{".ply", ".obj", ".off", ".stl"};
+  constexpr std::array<std::string_view, 7> kVolumes{".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".vdb"};
+  const std::string extension = extension_of(file);
+  const auto is_one_of = [&](const auto& known) { return std::find(known.begin(), known.end(), extension) != known.end(); };
+  const bool mesh = is_one_of(kMeshes), volume = is_one_of(kVolumes);
+  if (!mesh && !volume && extension != ".xyz") {
+    refuse(file, "expected a mesh (.ply, .obj, .off, .stl), points (.xyz, .ply) or a volume (.nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vdb)",
+           extension.empty() ? "no extension" : '\'' + extension + '\'', "", ErrorKind::Usage);
+  }
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(file, unknown)) refuse(file, "expected a file that can be read", "none", "", ErrorKind::Io);
+  return mesh ? DataKind::Mesh : volume ? DataKind::Volume : DataKind::Points;
+}
+
+void refuse(const std::filesystem::path& file, std::string expected, std::string found, std::string hint, ErrorKind kind) {
+  throw Error(kind, Fault{.place = file.string(), .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = std::move(hint)});
+}
+
+std::string short_number(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return text.data();
+}
+
+}  // namespace supple::fit

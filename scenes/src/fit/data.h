@@ -1,0 +1,26 @@
+/// @file data.h
+/// What all readers of data share: refusals and the kinds of files.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "supple/core/error.h"
+
+namespace supple::fit {
+
+/// What a file holds, by its extension.
+enum class DataKind : std::uint8_t { Mesh, Points, Volume };
+
+/// .ply is a mesh, and points where it has no faces. @throws Error{Usage} for other extensions, Error{Io} for files that are absent
+[[nodiscard]] DataKind kind_of(const std::filesystem::path& file);
+
+/// The extension in lower case; .nii.gz is one.
+[[nodiscard]] std::string extension_of(const std::filesystem::path& file);
+
+[[noreturn]] void refuse(const std::filesystem::path& file, std::string expected, std::string found, std::string hint, ErrorKind kind = ErrorKind::Scene);
+
+/// A number in a message.
+[[nodiscard]] std::string short_number(double value);
+
+}  // namespace supple::fit
