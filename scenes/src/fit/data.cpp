@@ -3,10 +3,32 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstdint>
 #include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <string>
 #include <string_view>
 
 namespace supple::fit {
+namespace {
+
+/// Whether the header of a PLY file tells of faces; a file that has no such header is taken for a mesh, whose reader refuses it.
+bool ply_has_faces(const std::filesystem::path& file) {
+  constexpr std::size_t kMostLines = 1000;
+  std::ifstream in(file, std::ios::binary);
+  std::string line;
+  for (std::size_t number = 0; number < kMostLines && std::getline(in, line); ++number) {
+    std::istringstream words(line);
+    std::string element, name;
+    std::uint64_t count = 0;
+    if (words >> element >> name >> count && element == "element" && name == "face") return count > 0;
+    if (element == "end_header") return false;
+  }
+  return true;
+}
+
+}  // namespace
 
 std::string extension_of(const std::filesystem::path& file) {
   const auto lower = [](std::string text) {
@@ -29,6 +51,7 @@ DataKind kind_of(const std::filesystem::path& file) {
   }
   std::error_code unknown;
   if (!std::filesystem::is_regular_file(file, unknown)) refuse(file, "expected a file that can be read", "none", "", ErrorKind::Io);
+  if (extension == ".ply" && !ply_has_faces(file)) return DataKind::Points;
   return mesh ? DataKind::Mesh : volume ? DataKind::Volume : DataKind::Points;
 }
 

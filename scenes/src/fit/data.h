@@ -2,6 +2,7 @@
 /// What all readers of data share: refusals and the kinds of files.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -9,10 +10,10 @@
 
 namespace supple::fit {
 
-/// What a file holds, by its extension.
+/// What a file holds, by its extension, and of .ply by its header.
 enum class DataKind : std::uint8_t { Mesh, Points, Volume };
 
-/// .ply is a mesh, and points where it has no faces. @throws Error{Usage} for other extensions, Error{Io} for files that are absent
+/// @throws Error{Usage} for other extensions, Error{Io} for files that are absent
 [[nodiscard]] DataKind kind_of(const std::filesystem::path& file);
 
 /// The extension in lower case; .nii.gz is one.

@@ -86,7 +86,7 @@ Soup read_soup(const std::filesystem::path& file) {
     for (const Vec3& p : mesh.position) soup.points.emplace_back(p.x(), p.y(), p.z());
     for (const auto& t : mesh.triangle) soup.faces.push_back({t[0], t[1], t[2]});
   }
-  if (soup.faces.empty() && (soup.points.empty() || extension_of(file) != ".ply")) refuse(file, "expected triangles", "none", "");
+  if (soup.faces.empty()) refuse(file, "expected triangles", "none", "");
   for (const std::vector<std::size_t>& face : soup.faces) {
     for (const std::size_t corner : face) {
       if (corner >= soup.points.size()) refuse(file, "expected corners among the " + counted(soup.points.size(), "vertex", "vertices"), std::to_string(corner), "");
@@ -178,10 +178,7 @@ Soup read_data(const std::filesystem::path& file, const FitOptions& options, Rep
     Volume volume = extension_of(file) == ".vdb" ? read_vdb(file) : read_image(file);
     return soup_of(surface_of_volume(file, std::move(volume), options, repair, executor));
   }
-  if (kind == DataKind::Mesh) {
-    Soup soup = read_soup(file);
-    if (!soup.faces.empty()) return soup;
-  }
+  if (kind == DataKind::Mesh) return read_soup(file);
   return soup_of(surface_through_points(file, options.error, repair));
 }
 
