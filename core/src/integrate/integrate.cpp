@@ -296,24 +296,27 @@ void evaluate(const ForceModel& forces, const ParticleState& state, double time,
 void Ledger::save(StateWriter& out) const {
   out.write(external_work);
   out.write(dissipated);
-  for (const Vec3* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
+  for (const VectorSum* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
     save_vector(*v, out);
+    save_vector(v->rest, out);
   }
 }
 
 void Ledger::load(StateReader& in) {
   in.read(external_work);
   in.read(dissipated);
-  for (Vec3* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
+  for (VectorSum* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
     load_vector(*v, in);
+    load_vector(v->rest, in);
   }
 }
 
 void Ledger::hash(Hasher& hasher) const {
   hasher.add(external_work);
   hasher.add(dissipated);
-  for (const Vec3* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
+  for (const VectorSum* v : {&external_impulse, &external_angular_impulse, &pin_impulse, &pin_angular_impulse}) {
     hash_vector(*v, hasher);
+    hash_vector(v->rest, hasher);
   }
 }
 

@@ -78,6 +78,20 @@ struct Oscillator {
   [[nodiscard]] double x() const { return s.p.state.position[0].x(); }
 };
 
+TEST(VectorSum, HasTheRoundingOfOneTermAfterAMillion) {
+  const Vec3 term(9.81 / 30720.0, 0.1, -1.0 / 3.0);
+  constexpr int kTerms = 1'000'000;
+  VectorSum sum;
+  for (int i = 0; i < kTerms; ++i) sum += term;
+  for (int k = 0; k < 3; ++k) {
+    // Exact to the last bit but one: a product of the rounded term and a whole number.
+    const double exact = term[k] * kTerms;
+    EXPECT_LE(std::abs(sum[k] - exact), 2.0 * std::numeric_limits<double>::epsilon() * std::abs(exact)) << k;
+  }
+  for (int i = 0; i < kTerms; ++i) sum -= term;
+  EXPECT_LE((sum + sum.rest).norm(), 1e-15);
+}
+
 TEST(QuarticWell, HasItsAmplitudeDependentPeriod) {
   // T = Gamma(1/4)^2 / sqrt(pi) sqrt(mu / k_3) / A = 74.163 for mu = k_3 = 1, A = .1.
   Oscillator well(0.1, [](double x) { return -x * x * x; });

@@ -31,14 +31,29 @@ void rotate_free_exponential(Quat& orientation, const Vec3& angular_momentum, co
 /// How a free body rotates within a step.
 enum class RotationUpdate : std::uint8_t { Splitting, Exponential };
 
+/// A sum of vectors whose rounding error does not grow with the number of its terms (Kahan 1965): the impulses of gravity over a million equal steps would
+/// else be off by a million roundings of one sign.
+struct VectorSum : Vec3 {
+  Vec3 rest = Vec3::Zero();  ///< what rounding has left out
+
+  VectorSum() : Vec3(Vec3::Zero()) {}
+  VectorSum& operator+=(const Vec3& term) {
+    const Vec3 whole = term + rest, before = *this;
+    Vec3::operator=(before + whole);
+    rest = whole - (*this - before);
+    return *this;
+  }
+  VectorSum& operator-=(const Vec3& term) { return *this += -term; }
+};
+
 /// Work, heat and impulses of all steps so far; part of State.
 struct Ledger {
   double external_work = 0.0;       ///< work of external loads and gravity [J]
   double dissipated = 0.0;          ///< energy dissipated by friction, medium damping and contact [J], >= 0
-  Vec3 external_impulse = Vec3::Zero();          ///< of external loads, gravity, medium damping, fixed bodies [N s]
-  Vec3 external_angular_impulse = Vec3::Zero();  ///< of the same about the world origin [N m s]
-  Vec3 pin_impulse = Vec3::Zero();               ///< of the pins [N s]
-  Vec3 pin_angular_impulse = Vec3::Zero();       ///< of the pins about the world origin [N m s]
+  VectorSum external_impulse;                   ///< of external loads, gravity, medium damping, fixed bodies [N s]
+  VectorSum external_angular_impulse;           ///< of the same about the world origin [N m s]
+  VectorSum pin_impulse;                        ///< of the pins [N s]
+  VectorSum pin_angular_impulse;                ///< of the pins about the world origin [N m s]
   void save(StateWriter& out) const;
   void load(StateReader& in);
   void hash(Hasher& hasher) const;
