@@ -1,13 +1,8 @@
 #!/usr/bin/env bash
-# Fits the data of scripts/data.sh and prints the table of docs/fitting.md; draws data beside fit, and with --films the scenes of examples/fits.
-#   scripts/fits.sh [--films] [SUPPLE] [FOLDER]     the tool (default: build/release/bin/supple); folder of data, objects and films (default: out/data)
+# Fits the data of scripts/data.sh, prints the table of docs/fitting.md and makes its picture, FOLDER/fits.png.
+#   scripts/fits.sh [SUPPLE] [FOLDER]     the tool (default: build/release/bin/supple); folder of data, objects and pictures (default: out/data)
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-films=0
-if [[ ${1:-} == --films ]]; then
-  films=1
-  shift
-fi
 tool=${1:-$root/build/release/bin/supple}
 folder=${2:-out/data}
 "$root/scripts/data.sh" "$folder" >/dev/null
@@ -39,8 +34,9 @@ fit hippo hippo1.ply --error 2%
 fit liver liver.nhdr --error 2% --particles 60 --label 255 --pieces largest
 fit skull skull.nhdr --error 2% --iso 2.9 --pieces largest
 
-((films == 1)) || exit 0
-for scene in "$root"/examples/fits/*.yaml; do
-  cp "$scene" "$folder/"
-  "$tool" run "$folder/$(basename "$scene")" --out "$folder/films/$(basename "$scene" .yaml)" --overwrite
-done
+# Data on the left, fit on the right.
+inputs=()
+for name in bunny00 armadillo elephant kitten liver skull; do inputs+=(-i "$folder/$name.png"); done
+ffmpeg -hide_banner -loglevel error -y "${inputs[@]}" -filter_complex \
+  "$(for k in 0 1 2 3 4 5; do printf '[%d]scale=480:-1:flags=area[s%d];' $k $k; done)[s0][s1][s2][s3][s4][s5]xstack=inputs=6:layout=0_0|w0_0|0_h0|w0_h0|0_h0+h2|w0_h0+h2" \
+  -frames:v 1 "$folder/fits.png"

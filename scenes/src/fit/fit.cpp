@@ -251,6 +251,7 @@ Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executo
     for (const Vec3& p : faults.outside) targets.outside.add(p, weight(p));
     reach = std::max(0.7 * reach, kLeastReach * options.error);
     divide(out.blobs, data, field, faults.outside, reach);
+    if (out.blobs.size() > options.primitives) out.blobs.resize(options.primitives);
     std::vector<Ball> more = cover_surface(data.surface, data.points, data.radius, faults.missed, reach);
     for (const Vec3& p : faults.inside) more.push_back({p, std::min(data.tree.distance(p), data.largest_ball)});
     more.resize(std::min<std::size_t>(more.size(), options.primitives - std::min<std::size_t>(options.primitives, out.blobs.size())));
