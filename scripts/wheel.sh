@@ -36,7 +36,7 @@ pack_build() {
   folder=$(echo "$work"/content/supple-*)
   info=$(echo "$folder"/supple-*.dist-info)
   cmake --build "$build" --target benchmarks >/dev/null
-  if cmake --build "$build" --target help | grep -q supple_fit_program; then cmake --build "$build" --target supple_fit_program >/dev/null; fi
+  if [[ $(cmake --build "$build" --target help) == *supple_fit_program* ]]; then cmake --build "$build" --target supple_fit_program >/dev/null; fi
   cmake --install "$build" --component wheel --prefix "$folder" --strip >/dev/null
   mkdir -p "${info%.dist-info}.data/scripts"
   cp "$root/scenes/python/command/supple" "${info%.dist-info}.data/scripts/"
