@@ -15,6 +15,7 @@ import time
 import traceback
 
 import rows_failures
+import rows_fits
 import rows_inputs
 import rows_programs
 import rows_runs
@@ -44,6 +45,7 @@ ROWS = [
     Row("tool", "mutated scenes by the command line: checked in 1 s of processor time, the quickest of three, and 256 MB; then run under a time limit", 500, "scenes", rows_inputs.mutated_by_tool),
     Row("hostile", "hostile scenes and golden messages: refused in 1 s of processor time, the quickest of three, and 256 MB", 250, "scenes", rows_inputs.hostile),
     Row("files", "meshes (OBJ, PLY, OFF, STL) and tables (CSV), mutated", 2_000, "files", functools.partial(rows_inputs.by_libraries, "files")),
+    Row("fits", "fits of damaged meshes, scenes with damaged objects, fits whose input, output and memory fail or that are killed: refused with a message, no incomplete file", 400, "trials", rows_fits.fits),
     Row("fuzz", "fuzz targets (mesh, CSV, PNG, scene, state with a right checksum): corpora with changes; used or refused", 50_000, "inputs", rows_programs.fuzz),
     Row("libfuzzer", "the fuzz targets led by coverage, with address and undefined-behaviour sanitizers, by clang (builds all libraries first)", 300, "minutes", rows_programs.sanitized_fuzz, only_named=True),
     Row("state-bytes", "saved states with altered bytes, by the library: refused", 10_000, "states", functools.partial(rows_inputs.by_libraries, "states")),
@@ -124,10 +126,9 @@ times include waiting. `scripts/stress.sh --self-test` plants faults and checks 
 FOOT = """
 ## What is not covered, and why
 
-- **Allocations before `main`.** Libraries make about seventy for their own objects. If one fails, the process aborts; nothing is written at that point.
 - **Graphics drivers.** What Mesa does when memory is out is its own. The row `memory` draws by the path tracer.
 - **Power failure and network file systems.** A kill ends the process, not the machine. Files are flushed to the disk before they get their final names,
-  but nobody has pulled a plug, and NFS has not been tried.
+  but nobody has pulled a plug. NFS has not been tried; on sshfs, mounted once, 13 kills, 4 races, 8 kills while frames are shared and 6 signals show no fault.
 - **OpenVDB files.** No command reads them. A damaged file is exported again from the saved states.
 - **Fuzzing led by coverage.** It needs clang. `scripts/test.sh` replays the corpora with changes. `scripts/check_all.sh sanitizers` runs each target for a minute,
   and `scripts/stress.sh libfuzzer` for an hour.
@@ -136,8 +137,8 @@ FOOT = """
 - **Bits of other builds.** Results are the same for any number of threads, but not for another compiler. A run continues only from states of its own build.
 - **Order of particles.** Explicit steps apply the friction law pair by pair, so another order changes the result by the error of the step. The row `invariance` leaves
   this law out.
-- **Obstacles out of reach.** A finished run is drawn again with another obstacle only if the scene says that nothing touches it (`collide: false`). Whether something would have
-  reached it is not computed.
+- **Obstacles out of reach.** A finished run is drawn again with other obstacles at rest where boxes around each object, over 1/32 of the run or less, prove that nothing came to them. One
+  inside such a box that nothing touched is refused, and so are obstacles that move and those of primitives. `--resume` takes no other obstacles.
 """
 
 
@@ -181,7 +182,7 @@ def main():
         parser.error(f"no row is named {', '.join(sorted(unknown))}; rows: {', '.join(row.name for row in ROWS)}")
     if not 0.0 < arguments.share <= 1.0:
         parser.error("--share: expected a number above 0, at most 1")
-    scratch = pathlib.Path(arguments.build) / "stress" / str(os.getpid())
+    scratch = pathlib.Path(arguments.build).resolve() / "stress" / str(os.getpid())
     context = Context(SOURCES, arguments.build, scratch, arguments.seed, arguments.share, max(1, arguments.jobs))
     if arguments.self_test:
         import self_test

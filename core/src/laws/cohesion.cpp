@@ -132,9 +132,10 @@ double Cohesion::energy(double distance) const {
     const int panels = static_cast<int>(std::ceil(end / width));
     for (int k = 0; k < panels; ++k) sum += integrate_panel(a, end * k / panels, end * (k + 1) / panels);
   } else {
+    const double last = std::max(v, -std::sqrt(150.0 / a));  // beyond it exp(-150) outweighs the pole
     double begin = 0.0;
-    while (begin > v) {
-      const double end = std::max(v, begin - std::min(width, 0.5 * (1.0 + begin)));
+    while (begin > last) {
+      const double end = std::max(last, begin - std::min(width, 0.5 * (1.0 + begin)));
       sum += integrate_panel(a, begin, end);
       begin = end;
     }

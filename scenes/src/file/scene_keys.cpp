@@ -344,6 +344,12 @@ SceneKeys motion_keys(const Scene& scene, FileHashes& hashes) {
   return keys_of(std::move(acting), moves, hashes);
 }
 
+bool may_touch(const Scene& scene) {
+  Scene acting = scene;
+  const Touching touching(scene);
+  return leave_out_solids(touching, acting) || touching.among_objects();
+}
+
 SceneKeys picture_keys(const Scene& scene, FileHashes& hashes) {
   SceneKeys keys = keys_of(scene, shows, hashes);
   const std::span<const CameraDesc> cameras = cameras_of(scene);

@@ -29,6 +29,8 @@ inline constexpr std::string_view kNone = "none";
 /// the rules of the scene. An obstacle counts if an object may touch it, even if none comes near.
 /// @param hashes  of the files that the scene names
 [[nodiscard]] SceneKeys motion_keys(const Scene& scene, FileHashes& hashes);
+/// Whether objects may touch anything, one another included, by the rules of the scene.
+[[nodiscard]] bool may_touch(const Scene& scene);
 /// The keys that affect a picture of a given state.
 [[nodiscard]] SceneKeys picture_keys(const Scene& scene, FileHashes& hashes);
 

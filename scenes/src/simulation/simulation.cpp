@@ -9,6 +9,7 @@
 #include "simulation/held_volumes.h"
 #include "simulation/pair_contacts.h"
 #include "simulation/pieces.h"
+#include "simulation/reach.h"
 #include "simulation/stages.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
@@ -65,6 +66,8 @@ Simulation::Impl::Impl(Scene s, SimulationOptions o)
   form_awake();
   state.halvings = (options.questions ? wanted_halvings : first_halvings)(scene, model, integrator, laws, state);
   leave_overlapping();
+  book_reach(model, state, 0.0, state.record);
+  look_for_solids(model, state.record);
   book_audits();
   created_before = 0.0;
   place_cameras();
@@ -122,7 +125,12 @@ void Simulation::Impl::make_step() {
     frame.surface.clear();
     frame.traction_force.clear();
   } else {
+    book_reach(model, state, 0.0, state.record);
+    const std::vector<Vec3> before = state.particles.velocity;
     integrate();
+    // Forces may be found at trial places, which differ from those between the ends of the step by what the change of velocity makes.
+    constexpr double kTrials = 2.0;
+    book_reach(model, state, kTrials * dt() * largest_difference(before, state.particles.velocity), state.record);
   }
   ++state.steps;
   ++state.substep;
@@ -136,6 +144,7 @@ void Simulation::Impl::make_step() {
   hold_volumes();
   lay_to_sleep();
   if (state.substep == (1 << state.halvings)) {
+    look_for_solids(model, state.record);
     state.substep = 0;
     ++state.frame;
   }
@@ -400,7 +409,13 @@ void Simulation::restore(State state) {
   SUPPLE_EXPECTS(state.broken_for.size() == impl_->model.links.size());
   SUPPLE_EXPECTS(state.volumes.size() == impl_->state.volumes.size());
   impl_->drop_results();
+  renumber_solids(impl_->model, state);
   impl_->take(std::move(state));
+  // Which samples there are depends on the solids; a state may be drawn with others.
+  for (std::size_t i = 0; i < impl_->bodies.size(); ++i) {
+    implicit::SampleState& samples = impl_->state.samples[i];
+    if (samples.distance.size() != impl_->bodies[i].samples.size()) samples = fresh_samples(impl_->bodies[i]);
+  }
 }
 
 const std::vector<Mesh>& Simulation::meshes() { return impl_->pull_meshes(); }

@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "simulation/pieces.h"
+#include "simulation/reach.h"
 #include "simulation/rest.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/parts.h"
 
@@ -19,7 +21,7 @@ core::ParticleState changed_particles(const ParticleChange& change, const core::
   };
   const auto take = [&](const std::string& name, const auto& array, auto& to, const auto& good, const char* what) {
     if (!array) return;
-    if (array->size() != now.size()) fail(name, "expected " + std::to_string(now.size()) + " rows", std::to_string(array->size()));
+    if (array->size() != now.size()) fail(name, "expected " + counted(now.size(), "row"), std::to_string(array->size()));
     const auto bad = std::find_if_not(array->begin(), array->end(), good);
     if (bad != array->end()) fail(name, what, "others in row " + std::to_string(bad - array->begin()));
     to = *array;
@@ -98,6 +100,8 @@ void Simulation::Impl::adopt(State other) {
   if (!(model.reaction.stick.stiffness > 0.0)) other.sticks = {};
   drop_results();
   take(std::move(other));
+  book_reach(model, state, 0.0, state.record);
+  look_for_solids(model, state.record);
   book_audits();
 }
 
@@ -112,6 +116,8 @@ void Simulation::Impl::set_particles(const ParticleChange& change) {
   const double energy = energies().total();
   const core::Motion motion = core::measure_motion(model.particles, state.particles);
   state.particles = next;
+  book_reach(model, state, 0.0, state.record);
+  look_for_solids(model, state.record);
   state.kick.valid = false;
   drop_results();
   wake(changed);

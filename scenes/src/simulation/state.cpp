@@ -14,7 +14,7 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x31656c7070757373;  // "ssupple1" as little-endian bytes
-constexpr std::uint64_t kVersion = 15;
+constexpr std::uint64_t kVersion = 16;
 constexpr std::size_t kLargestFile = std::size_t{8} << 30;
 
 void write(StateWriter& out, const Vec3& v) { out.write(std::span<const Vec3>(&v, 1)); }
@@ -24,6 +24,45 @@ void read(StateReader& in, Vec3& v) {
   in.read(one);
   if (one.size() != 1) throw Error(ErrorKind::Corrupt, Fault{.expected = "expected one vector in the saved state"});
   v = one[0];
+}
+
+void save_reach(StateWriter& out, const RunRecord& r) {
+  out.write(std::uint64_t{r.solids.size()});
+  for (const RunRecord::Solid& solid : r.solids) {
+    out.write(std::string_view(solid.name));
+    out.write(std::uint64_t{solid.reached});
+  }
+  out.write(r.reach_frames);
+  out.write(std::uint64_t{r.reach.size()});
+  for (const std::vector<Box>& boxes : r.reach) {
+    std::vector<Vec3> corners;
+    for (const Box& box : boxes) corners.insert(corners.end(), {box.lower, box.upper});
+    out.write(std::span<const Vec3>(corners));
+  }
+}
+
+void load_reach(StateReader& in, RunRecord& r) {
+  std::uint64_t n = 0;
+  in.read(n);
+  r.solids.clear();
+  for (std::uint64_t i = 0; i < n; ++i) {
+    RunRecord::Solid solid;
+    std::uint64_t reached = 0;
+    in.read(solid.name);
+    in.read(reached);
+    solid.reached = reached != 0;
+    r.solids.push_back(std::move(solid));
+  }
+  in.read(r.reach_frames);
+  in.read(n);
+  r.reach.clear();
+  for (std::uint64_t i = 0; i < n; ++i) {
+    std::vector<Vec3> corners;
+    in.read(corners);
+    if (corners.size() % 2 != 0 || r.reach_frames == 0) throw Error(ErrorKind::Corrupt, Fault{.expected = "expected boxes in the saved state"});
+    std::vector<Box>& boxes = r.reach.emplace_back();
+    for (std::size_t k = 0; k < corners.size(); k += 2) boxes.push_back({corners[k], corners[k + 1]});
+  }
 }
 
 /// Members of PairContact that are numbers, and those that are vectors.
@@ -91,6 +130,7 @@ void save_record(StateWriter& out, const RunRecord& r) {
     out.write(pair.power);
   }
   save_contacts(out, r.pair_contacts);
+  save_reach(out, r);
 }
 
 void load_record(StateReader& in, RunRecord& r) {
@@ -137,6 +177,7 @@ void load_record(StateReader& in, RunRecord& r) {
     r.pair_work.push_back(pair);
   }
   load_contacts(in, r.pair_contacts);
+  load_reach(in, r);
 }
 
 Fault fault_of(const std::filesystem::path& path, std::string expected, std::string found, std::string hint) {
@@ -270,7 +311,9 @@ State state_of_bytes(const std::string& place, std::span<const std::byte> bytes,
   in.read(scene);
   in.read(keys);
   in.read(program);
-  if (wanted.differences != nullptr) {
+  if (wanted.belongs_to != nullptr) {
+    *wanted.belongs_to = {scene, std::make_shared<const std::string>(keys)};
+  } else if (wanted.differences != nullptr) {
     *wanted.differences = origin.keys && !keys.empty() ? differences(keys_in(*origin.keys), keys_in(keys)).found : std::string();
   } else if (scene != origin.scene) {
     refuse_scene(path, origin, keys, wanted.otherwise);

@@ -124,6 +124,13 @@ TEST(CohesionEnergy, IsFiniteHoweverNearThePole) {
   }
 }
 
+TEST(CohesionEnergy, OfANarrowForceTakesFewPanels) {
+  // The force ends within 1e-9 of the rest distance; panels as narrow as that do not go on to the pole.
+  const Cohesion narrow{.r0 = 1.0, .f0 = 1.0, .a = 1e20};
+  EXPECT_EQ(narrow.energy(1e-9), narrow.energy(0.5));
+  EXPECT_GT(narrow.energy(0.5), 0.0);
+}
+
 TEST(CohesionEnergy, TendsToTheBindingEnergy) {
   for (const double a : {0.1, 1.0, 16.0 / 3.0, 20.0, 39.0, 41.0, 120.0}) {
     const Cohesion law{.r0 = 2.0, .f0 = 5.0, .a = a};

@@ -81,6 +81,15 @@ struct RunRecord {
   };
   std::vector<PairContact> pair_contacts;  ///< of all pairs that ever touched, sorted by objects
   std::uint64_t core_impulses = 0;     ///< pairs that hard cores turned back
+  /// A solid, and whether the surface of an object may have come to it. Those that none came to have no part in the motion.
+  struct Solid {
+    std::string name;
+    bool reached = false;
+  };
+  std::vector<Solid> solids;           ///< in the order of Model::fixed
+  /// Boxes that hold the surface of an object with contact in the steps so far, one for `reach_frames` frames after the other [m]; by object, the last ones may be left out.
+  std::vector<std::vector<Box>> reach;
+  std::uint64_t reach_frames = 1;
   bool valid = false;
 };
 
@@ -118,6 +127,8 @@ struct StateWanted {
   std::string otherwise{};     ///< what else to do about a state of another scene: "or ..."
   /// Not null: a state of another scene is accepted, and this says in which keys they differ: "objects.ball.particles.mass=2 (here 1)".
   std::string* differences = nullptr;
+  /// Not null: a state of another scene is accepted, and this receives that scene.
+  StateOrigin* belongs_to = nullptr;
 };
 
 /// A damaged file: it is truncated, or a byte of it changed.
@@ -130,5 +141,10 @@ class DamagedState : public Error {
 void save_state(const std::filesystem::path& path, const State& state, const StateOrigin& origin);
 /// @throws DamagedState; Error{Corrupt} when the state is complete but does not meet the requirements; Error{Io}
 [[nodiscard]] State load_state(const std::filesystem::path& path, const StateOrigin& origin, const StateWanted& wanted = {});
+
+/// The scene that draws a saved state. It is the given one where that has written the state. Where the two differ in solids at rest that no surface came to up to
+/// this state, as `RunRecord::reach` and `solids` prove, it is the given one with those solids out of contact, and the state belongs to it. Otherwise it is the given
+/// one, and `load_state` refuses.
+[[nodiscard]] Scene scene_to_draw(const Scene& scene, const std::filesystem::path& state);
 
 }  // namespace supple::scenes

@@ -5,13 +5,15 @@
 #include "output/files/animation_parts.h"
 #include "output/files/frame_writer.h"
 #include "output/files/saved_frames.h"
+#include "output/run/unreached.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/gltf_file.h"
 
 namespace supple::scenes {
 
-std::filesystem::path write_gltf(const Scene& scene, const RunOptions& options) {
+std::filesystem::path write_gltf(const Scene& given, const RunOptions& options) {
   const InterruptScope scope(options.interrupt);
+  const Scene scene = scene_to_draw(given, options.folder, options.frames);
   const std::vector<int> frames = saved_frames(options.folder, scene, options.frames);
   Simulation simulation(scene, {.threads = options.threads, .delaunay = options.delaunay, .interrupt = options.interrupt, .memory = options.scene_memory,
                                 .questions = true});

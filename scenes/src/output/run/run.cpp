@@ -29,6 +29,7 @@
 #include "output/run/result_file.h"
 #include "output/run/run_origin.h"
 #include "output/run/stage_errors.h"
+#include "output/run/unreached.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
@@ -566,7 +567,7 @@ RunResult render_run(const Scene& scene, const RunOptions& options) {
   OutputRequest outputs = outputs_of(scene, options);
   outputs.images = true;
   outputs.contacts = outputs.particles = outputs.meshes = outputs.grids = outputs.samples = false;
-  return replay(scene, options, outputs, "render.json");
+  return replay(scene_to_draw(scene, options.folder, options.frames), options, outputs, "render.json");
 }
 
 std::vector<fs::path> make_sheets(const Scene& scene, const fs::path& folder) {
@@ -597,7 +598,7 @@ RunResult export_run(const Scene& scene, const RunOptions& options) {
                                         .found = "none",
                                         .hint = "name them: supple export SCENE --mesh usd --particles vtk"});
   }
-  return replay(scene, options, outputs, "export.json");
+  return replay(scene_to_draw(scene, options.folder, options.frames), options, outputs, "export.json");
 }
 
 }  // namespace supple::scenes

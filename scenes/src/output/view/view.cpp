@@ -10,8 +10,10 @@
 #include "output/files/output_files.h"
 #include "output/files/saved_frames.h"
 #include "output/pictures/camera.h"
+#include "output/run/unreached.h"
 #include "output/view/view_arrays.h"
 #include "output/view/view_frame.h"
+#include "supple/core/counted.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/atomic_file.h"
@@ -105,7 +107,7 @@ Json solids_of(const Scene& scene) {
 struct RunView::Impl {
   Impl(const Scene& scene, const ViewOptions& options)
       : folder(options.folder), interrupt(options.interrupt),
-        simulation(for_view(scene), {.threads = options.threads, .interrupt = options.interrupt, .memory = options.memory, .questions = true}) {}
+        simulation(for_view(scene_to_draw(scene, options.folder, options.frames)), {.threads = options.threads, .interrupt = options.interrupt, .memory = options.memory, .questions = true}) {}
 
   fs::path folder;
   const std::atomic<int>* interrupt;
@@ -156,7 +158,7 @@ ViewResult write_view(const Scene& scene, const ViewOptions& options) {
     if (attempt + 1 == kTries || cells <= 4) {
       throw Error(ErrorKind::Limit, Fault{.place = "--size",
                                           .key = {},
-                                          .expected = "expected room for a page of " + std::to_string(frames.size()) + " frames",
+                                          .expected = "expected room for a page of " + counted(frames.size(), "frame"),
                                           .found = std::to_string(static_cast<long>(options.size)) + " bytes, of " + std::to_string(page.size()),
                                           .hint = "choose fewer frames, e.g. --frames 1-" + std::to_string(frames.back()) + ":4"});
     }
