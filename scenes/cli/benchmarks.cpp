@@ -21,7 +21,7 @@ struct Group {
   bool names = false;  ///< the program takes the rest of a name that begins with the group
 };
 
-constexpr std::array<Group, 15> kGroups{{
+constexpr std::array<Group, 16> kGroups{{
     {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)", true},
     {"core/integrators", "integrator_bench", "time against error of every integrator; with a file name: plot (SVG)"},
     {"core/stability", "core_stress", "largest stable steps; with a file name: map (SVG)"},

@@ -15,6 +15,7 @@
 #include "output/files/output_files.h"
 #include "output/files/saved_frames.h"
 #include "output/run/run_origin.h"
+#include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/render/image.h"
@@ -35,8 +36,11 @@ constexpr const char* kFrames = "frames";
 /// Names of the files in a folder: of several machines, a folder is up to date when it is opened, while single names may be remembered.
 std::set<std::string> files_in(const fs::path& folder) {
   std::set<std::string> names;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(folder, none)) names.insert(entry.path().filename().string());
+  std::error_code error;
+  const fs::directory_iterator begin(folder, error);
+  if (error == std::errc::no_such_file_or_directory) return names;
+  if (error) throw Error(ErrorKind::Io, Fault{.place = folder.string(), .key = {}, .expected = "cannot be read: " + error.message(), .found = {}, .hint = {}});
+  for (const auto& entry : begin) names.insert(entry.path().filename().string());
   return names;
 }
 
