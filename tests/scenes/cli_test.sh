@@ -105,7 +105,7 @@ expect 0 '' query contact good.yaml --error 1e-10
 expect 0 '' bench --list
 expect 2 '--list' bench cores
 expect 2 "found '--lst'" bench --lst
-expect 2 'collision/poses, collision/invariance' bench collision/posess
+expect 2 'collision/poses, collision/calibration' bench collision/posess
 # Programs of benchmarks get what follows their names, options too, in its order.
 mkdir bin
 ln "$supple" bin/supple 2> err.txt || cp "$supple" bin/supple
@@ -246,7 +246,7 @@ for file in link.csv folder/points.csv ../elsewhere/points.csv "$PWD/elsewhere/p
   expect 0 '' run inside/names.yaml --allow-path elsewhere/points.csv --out allowed --overwrite --simulate-only --progress none
 done
 printf 'include: part.yaml\n%s\n' "$(grep -v duration good.yaml)" > inside/includes.yaml
-expect 3 "expected a file inside the scene's folder, found a link to another place; --allow-path" check inside/includes.yaml
+expect 3 "expected a file inside the scene's folder, found 'part.yaml', a link to another place; --allow-path" check inside/includes.yaml
 expect 0 '' check inside/includes.yaml --allow-path elsewhere
 sed 's/^objects:/ground: {texture: {pattern: picture, file: link.csv}}\nobjects:/' good.yaml > inside/texture.yaml
 expect 4 "expected a file inside the scene's folder, found a link" check inside/texture.yaml

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <sstream>
 #include <string>
 #include <string_view>
+
+#include "supple/core/io/atomic_file.h"
 
 namespace supple::fit {
 namespace {
@@ -49,8 +52,8 @@ DataKind kind_of(const std::filesystem::path& file) {
     refuse(file, "expected a mesh (.ply, .obj, .off, .stl), points (.xyz, .ply) or a volume (.nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vdb)",
            extension.empty() ? "no extension" : '\'' + extension + '\'', "", ErrorKind::Usage);
   }
-  std::error_code unknown;
-  if (!std::filesystem::is_regular_file(file, unknown)) refuse(file, "expected a file that can be read", "none", "", ErrorKind::Io);
+  std::array<std::byte, 1> first{};
+  if (!io::read_start(file, first)) (void)io::read_file(file, first.size());  // which says why
   if (extension == ".ply" && !ply_has_faces(file)) return DataKind::Points;
   return mesh ? DataKind::Mesh : volume ? DataKind::Volume : DataKind::Points;
 }

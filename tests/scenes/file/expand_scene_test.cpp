@@ -247,17 +247,17 @@ TEST_F(ExpandedScene, RefusesIncludesInACircleOutsideItsFolderAndOfOtherFiles) {
   EXPECT_EQ(faults("include: a.yaml\nschema: 1\n")[0].expected, "expected files that do not include one another in a circle");
   EXPECT_EQ(faults("include: ../other.yaml\nschema: 1\n")[0].expected, "expected a file inside the scene's folder");
   EXPECT_EQ(faults("include: /etc/passwd\nschema: 1\n")[0].expected, "expected a file inside the scene's folder");
-  EXPECT_EQ(faults("include: none.yaml\nschema: 1\n")[0].found, "nothing");
+  EXPECT_EQ(faults("include: none.yaml\nschema: 1\n")[0].found, "no file 'none.yaml'");
   try {  // beside a scene that is named without a folder
     (void)parse_scene("include: none.yaml\nschema: 1\n", "test.yaml", "");
     ADD_FAILURE() << "no fault";
   } catch (const Error& error) {
-    EXPECT_EQ(error.faults()[0].found, "nothing");
+    EXPECT_EQ(error.faults()[0].found, "no file 'none.yaml'");
   }
   fs::create_symlink("/etc/passwd", folder_ / "link.yaml");
   EXPECT_EQ(faults("include: link.yaml\nschema: 1\n")[0].expected, "expected a file inside the scene's folder");
   fs::create_directories(folder_ / "inner");
-  EXPECT_EQ(faults("include: inner\nschema: 1\n")[0].found, "a folder");
+  EXPECT_EQ(faults("include: inner\nschema: 1\n")[0].found, "'inner', a folder");
   write("many.yaml", "duration: 1\n");
   std::string many = "schema: 1\ninclude: [many.yaml";
   for (int i = 0; i < 100; ++i) many += ", many.yaml";
