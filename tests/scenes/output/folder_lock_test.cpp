@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <string>
 
+#include "output/run/program_identity.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 #include "support/temp_folder.h"
@@ -73,6 +75,12 @@ TEST_F(FolderLocks, RefuseAnotherLookAsLongAsOneIsDrawn) {
   first.reset();
   EXPECT_EQ(joining(built), "");
   EXPECT_EQ(joining(drawn), "");
+}
+
+TEST_F(FolderLocks, HoldTheBuildAsALineOfPrintableText) {
+  const std::string identity = program_identity();
+  EXPECT_FALSE(identity.empty());
+  EXPECT_TRUE(std::all_of(identity.begin(), identity.end(), [](unsigned char c) { return c > ' ' && c < 127; })) << identity;
 }
 
 TEST_F(FolderLocks, LeaveTheFilmToTheLastOne) {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstring>
+#include <string_view>
 
 namespace supple::scenes {
 namespace {
@@ -17,6 +18,17 @@ bool holds(const dl_phdr_info& object, ElfW(Addr) address) {
     if (segment.p_type == PT_LOAD && begin <= address && address < begin + segment.p_memsz) return true;
   }
   return false;
+}
+
+std::string digits_of(const char* bytes, std::size_t count) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto byte = static_cast<unsigned char>(bytes[i]);
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 15];
+  }
+  return text;
 }
 
 /// Finds the note NT_GNU_BUILD_ID of the object that contains this function: the tool, or the Python module.
@@ -34,7 +46,7 @@ int find_build_id(dl_phdr_info* object, std::size_t /*size*/, void* result) {
       const char* name = at + sizeof note;
       const char* content = name + padded(note.n_namesz);
       if (note.n_type == NT_GNU_BUILD_ID && note.n_namesz == 4 && std::memcmp(name, "GNU", 4) == 0) {
-        static_cast<std::string*>(result)->assign(content, note.n_descsz);
+        *static_cast<std::string*>(result) = digits_of(content, note.n_descsz);
         return 1;
       }
       at = content + padded(note.n_descsz);
