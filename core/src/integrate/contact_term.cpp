@@ -12,36 +12,6 @@
 namespace supple::core {
 namespace {
 
-using Vec6 = Eigen::Matrix<double, 6, 1>;
-
-constexpr double kNoEnd = -std::numeric_limits<double>::infinity();
-
-/// Approach from which a point presses [m]: where its pressure or its damping factor reaches zero.
-double first_approach(double pressure, double slope, double damping) {
-  double from = kNoEnd;
-  if (slope > 0.0) {
-    from = -pressure / slope;
-  } else if (!(pressure > 0.0)) {
-    return -kNoEnd;
-  }
-  return damping > 0.0 ? std::max(from, -1.0 / damping) : from;
-}
-
-/// f1(y) = 2 y - y^2 below 1, 1 beyond; its integral.
-double mollified(double y) { return y < 1.0 ? y * y * (1.0 - y / 3.0) : y - 1.0 / 3.0; }
-
-/// Friction over its largest value at the slip v is f = slope v; its derivative is slope 1 - fall f v^T.
-struct Secant {
-  double slope = 0.0;  ///< [s/m]
-  double fall = 0.0;   ///< [s^2/m^2]
-};
-
-Secant secant_of(double speed, double slow) {
-  const double y = speed / slow;
-  if (y >= 1.0) return {1.0 / speed, 1.0 / (speed * speed)};
-  return {(2.0 - y) / slow, speed > 0.0 ? 1.0 / (slow * speed * (2.0 - y)) : 0.0};
-}
-
 /// A spatial stiffness about `origin` as one about the particle's displacement and rotation: rows (force; moment about x).
 Mat6 twist_map(const Vec3& arm) {
   Mat6 map = Mat6::Identity();
@@ -79,19 +49,23 @@ void ContactPoints::clear() {
   split_torque.clear();
 }
 
-void ContactTerm::find_touched() {
+void ContactTerm::find_touched(std::size_t particles) {
+  constexpr std::uint32_t kUntouched = std::numeric_limits<std::uint32_t>::max();
   const ContactPoints& points = *points_;
-  touched_ = points.particle;
-  touched_.insert(touched_.end(), points.split_particle.begin(), points.split_particle.end());
-  std::sort(touched_.begin(), touched_.end());
-  touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
-  const auto entry_of = [&](std::uint32_t particle) {
-    return static_cast<std::uint32_t>(std::lower_bound(touched_.begin(), touched_.end(), particle) - touched_.begin());
-  };
+  rank_.assign(particles, kUntouched);
+  for (const std::uint32_t i : points.particle) rank_[i] = 0;
+  for (const std::uint32_t i : points.split_particle) rank_[i] = 0;
+  touched_.clear();
+  for (std::uint32_t i = 0; i < particles; ++i) {
+    if (rank_[i] == kUntouched) continue;
+    rank_[i] = static_cast<std::uint32_t>(touched_.size());
+    touched_.push_back(i);
+  }
+  const auto rank_of = [this](std::uint32_t particle) { return rank_[particle]; };
   entry_.resize(points.particle.size());
-  std::transform(points.particle.begin(), points.particle.end(), entry_.begin(), entry_of);
+  std::transform(points.particle.begin(), points.particle.end(), entry_.begin(), rank_of);
   split_entry_.resize(points.split_particle.size());
-  std::transform(points.split_particle.begin(), points.split_particle.end(), split_entry_.begin(), entry_of);
+  std::transform(points.split_particle.begin(), points.split_particle.end(), split_entry_.begin(), rank_of);
 }
 
 void ContactTerm::find_groups() {
@@ -111,8 +85,14 @@ void ContactTerm::find_groups() {
         }
       }
       groups_.push_back({.begin = q, .end = q + 1, .entry_begin = begin, .entry_end = end, .pair = k, .origin = p.point[q],
-                         .friction = p.pair[k].friction, .damping = p.pair[k].dissipation / rule_.h});
+                         .lanes = {.friction = p.pair[k].friction, .damping = p.pair[k].dissipation / rule_.h}});
     }
+  }
+  std::size_t lane = 0;
+  for (Group& group : groups_) {
+    group.lanes.begin = lane;
+    lane += (group.end - group.begin + kContactLanes - 1) / kContactLanes * kContactLanes;
+    group.lanes.end = lane;
   }
 }
 
@@ -123,68 +103,84 @@ void ContactTerm::begin(const ParticleSet& set, const ContactPoints& points, con
   points_ = &points;
   start_ = &start;
   rule_ = rule;
-  find_touched();
+  find_touched(set.size());
   find_groups();
-  const std::size_t count = points.point.size();
+  fill_lanes(set, predicted);
+  find_stick_speeds(slow);
+  placed_.clear();
+  place(predicted);
+  for (std::size_t q = 0; q < lanes_.approach.size(); ++q) lanes_.offset_pressure[q] -= lanes_.slope[q] * lanes_.approach[q];
+  split_place_.resize(points.split_particle.size());
+  for (std::size_t s = 0; s < split_place_.size(); ++s) split_place_[s] = predicted.position[points.split_particle[s]];
+  split_base_.assign(points.pair.size(), 0.0);
+  for (std::size_t k = 0; k < points.pair.size(); ++k) {
+    for (std::uint32_t q = points.pair[k].begin; q < points.pair[k].end; ++q) split_base_[k] += points.weight[q] * points.pressure[q];
+  }
+  split_scale_.assign(points.pair.size(), 0.0);
+  find_coupled();
+}
+
+void ContactTerm::fill_lanes(const ParticleSet& set, const ParticleState& predicted) {
+  const ContactPoints& points = *points_;
   arm_.resize(points.particle.size());
-  local_.resize(count);
-  start_velocity_.resize(count);
-  offset_pressure_.resize(count);
+  lanes_.assign(groups_.empty() ? 0 : groups_.back().lanes.end);
   std::vector<Vec3> spin(touched_.size());
-  for (std::size_t t = 0; t < touched_.size(); ++t) spin[t] = angular_velocity(set, start, touched_[t]);
+  for (std::size_t t = 0; t < touched_.size(); ++t) spin[t] = angular_velocity(set, *start_, touched_[t]);
   for (const Group& group : groups_) {
     Vec3 velocity = Vec3::Zero(), turn = Vec3::Zero();
     for (std::uint32_t e = group.entry_begin; e < group.entry_end; ++e) {
       const std::uint32_t i = points.particle[e];
       arm_[e] = group.origin - predicted.position[i];
-      velocity += points.share[e] * (start.velocity[i] + spin[entry_[e]].cross(arm_[e]));
+      velocity += points.share[e] * (start_->velocity[i] + spin[entry_[e]].cross(arm_[e]));
       turn += points.share[e] * spin[entry_[e]];
     }
     const double led = leads(group);
     for (std::uint32_t q = group.begin; q < group.end; ++q) {
-      local_[q] = points.point[q] - group.origin;
-      start_velocity_[q] = velocity + turn.cross(local_[q]);
-      if (led != 0.0) start_velocity_[q] += led * points.obstacle_velocity[q];
+      const std::size_t lane = group.lanes.begin + (q - group.begin);
+      const Vec3 local = points.point[q] - group.origin;
+      Vec3 start_velocity = velocity + turn.cross(local);
+      if (led != 0.0) {
+        start_velocity += led * points.obstacle_velocity[q];
+        lanes_.led.set(lane, rule_.h * led * points.obstacle_velocity[q]);
+      }
+      lanes_.local.set(lane, local);
+      lanes_.normal.set(lane, points.normal[q]);
+      lanes_.start_velocity.set(lane, start_velocity);
+      lanes_.weight[lane] = points.weight[q];
+      lanes_.slope[lane] = points.slope[q];
+      lanes_.offset_pressure[lane] = points.pressure[q];  // until the approach is known
     }
   }
-  placed_.clear();
-  place(predicted);
-  for (std::size_t q = 0; q < count; ++q) offset_pressure_[q] = points.pressure[q] - points.slope[q] * approach_[q];
-  split_place_.resize(points.split_particle.size());
-  for (std::size_t s = 0; s < split_place_.size(); ++s) split_place_[s] = predicted.position[points.split_particle[s]];
-  split_scale_.assign(points.pair.size(), 0.0);
-  find_stick_speeds(slow);
-  find_coupled();
-  lagged_.assign(count, 0.0);
-  direction_.assign(count, Vec3::Zero());
 }
 
 void ContactTerm::find_stick_speeds(const SlowSlip& slow) {
   const ContactPoints& points = *points_;
-  stick_speed_.assign(points.pair.size(), slow.speed);
-  for (std::size_t p = 0; p < points.pair.size(); ++p) {
-    double square = 0.0, all = 0.0;
-    for (std::uint32_t q = points.pair[p].begin; q < points.pair[p].end; ++q) {
+  std::vector<double> square(points.pair.size(), 0.0), all(points.pair.size(), 0.0);
+  for (const Group& group : groups_) {
+    for (std::uint32_t q = group.begin; q < group.end; ++q) {
       const double load = points.weight[q] * points.pressure[q];
-      square += load * start_velocity_[q].squaredNorm();
-      all += load;
+      square[group.pair] += load * lanes_.start_velocity.at(group.lanes.begin + (q - group.begin)).squaredNorm();
+      all[group.pair] += load;
     }
-    if (all > 0.0) stick_speed_[p] = std::max(slow.speed, slow.share * std::sqrt(square / all));
   }
-  for (Group& group : groups_) group.slow = stick_speed_[group.pair];
+  stick_speed_.assign(points.pair.size(), slow.speed);
+  for (std::size_t k = 0; k < points.pair.size(); ++k) {
+    if (all[k] > 0.0) stick_speed_[k] = std::max(slow.speed, slow.share * std::sqrt(square[k] / all[k]));
+  }
+  least_stick_.assign(touched_.size(), std::numeric_limits<double>::infinity());
+  for (Group& group : groups_) {
+    group.lanes.slow = stick_speed_[group.pair];
+    for (std::uint32_t e = group.entry_begin; e < group.entry_end; ++e) {
+      least_stick_[entry_[e]] = std::min(least_stick_[entry_[e]], group.lanes.slow);
+    }
+  }
 }
 
 void ContactTerm::scale_splits() {
-  const ContactPoints& p = *points_;
-  if (p.split_particle.empty()) return;
-  for (std::size_t k = 0; k < p.pair.size(); ++k) {
-    double now = 0.0, predicted = 0.0;
-    for (std::uint32_t q = p.pair[k].begin; q < p.pair[k].end; ++q) {
-      now += elastic_force(q);
-      predicted += p.weight[q] * p.pressure[q];
-    }
-    split_scale_[k] = predicted > 0.0 ? now / predicted : 0.0;
-  }
+  if (points_->split_particle.empty()) return;
+  std::fill(split_scale_.begin(), split_scale_.end(), 0.0);
+  for (const Group& group : groups_) split_scale_[group.pair] += elastic_force_of(lanes_, group.lanes);
+  for (std::size_t k = 0; k < split_scale_.size(); ++k) split_scale_[k] = split_base_[k] > 0.0 ? split_scale_[k] / split_base_[k] : 0.0;
 }
 
 void ContactTerm::find_coupled() {
@@ -241,28 +237,13 @@ void ContactTerm::place(const ParticleState& pose) {
     turned_[t] = rotation_log(pose.orientation[i] * start_->orientation[i].conjugate());
   }
   const ContactPoints& p = *points_;
-  const double factor = rule_.slip_factor / rule_.h;
-  displacement_.resize(p.point.size());
-  approach_.resize(p.point.size());
-  slip_.resize(p.point.size());
-  speed_.resize(p.point.size());
-  for (const Group& group : groups_) {
-    Vec3 moved = Vec3::Zero(), turning = Vec3::Zero();
+  for (Group& group : groups_) {
+    group.twist = {};
     for (std::uint32_t e = group.entry_begin; e < group.entry_end; ++e) {
-      moved += p.share[e] * (moved_[entry_[e]] + turned_[entry_[e]].cross(arm_[e]));
-      turning += p.share[e] * turned_[entry_[e]];
+      group.twist.moved += p.share[e] * (moved_[entry_[e]] + turned_[entry_[e]].cross(arm_[e]));
+      group.twist.turning += p.share[e] * turned_[entry_[e]];
     }
-    const double led = rule_.h * leads(group);
-    for (std::uint32_t q = group.begin; q < group.end; ++q) {
-      Vec3 u = moved + turning.cross(local_[q]);
-      if (led != 0.0) u += led * p.obstacle_velocity[q];
-      const Vec3& n = p.normal[q];
-      const Vec3 v = factor * u - (rule_.slip_factor - 1.0) * start_velocity_[q];
-      displacement_[q] = u;
-      approach_[q] = u.dot(n);
-      slip_[q] = v - v.dot(n) * n;
-      speed_[q] = slip_[q].norm();
-    }
+    place_points(lanes_, group.lanes, group.twist, rule_.slip_factor / rule_.h, rule_.slip_factor - 1.0);
   }
 }
 
@@ -275,89 +256,14 @@ double ContactTerm::leads(const Group& group) const {
   return 0.0;
 }
 
-double ContactTerm::normal_force(const Group& group, std::size_t q) const {
-  const double approach = approach_[q];
-  const double pressure = offset_pressure_[q] + points_->slope[q] * approach, damping = 1.0 + group.damping * approach;
-  return points_->weight[q] * std::max(pressure, 0.0) * std::max(damping, 0.0);
-}
-
-double ContactTerm::elastic_force(std::size_t q) const {
-  return points_->weight[q] * std::max(offset_pressure_[q] + points_->slope[q] * approach_[q], 0.0);
-}
-
-double ContactTerm::normal_potential(const Group& group, std::size_t q) const {
-  const double approach = approach_[q];
-  const double g = points_->slope[q], d = group.damping;
-  const double from = first_approach(offset_pressure_[q], g, d);
-  if (!(approach > from)) return 0.0;
-  const double w = points_->weight[q];
-  if (from == kNoEnd) return w * offset_pressure_[q] * approach;  // neither slope nor damping
-  const double t = approach - from, p = std::max(offset_pressure_[q] + g * from, 0.0), f = std::max(1.0 + d * from, 0.0);
-  return w * t * (p * f + t * (0.5 * (p * d + g * f) + t * (g * d / 3.0)));
-}
-
-double ContactTerm::normal_stiffness(const Group& group, std::size_t q) const {
-  const double approach = approach_[q];
-  const double g = points_->slope[q], d = group.damping;
-  const double pressure = offset_pressure_[q] + g * approach, damping = 1.0 + d * approach;
-  return pressure > 0.0 && damping > 0.0 ? points_->weight[q] * (g * damping + pressure * d) : 0.0;
-}
-
-Vec3 ContactTerm::gradient_of(const Group& group, std::size_t q) const {
-  Vec3 gradient = normal_force(group, q) * points_->normal[q];
-  const double most = group.friction * lagged_[q];
-  if (most > 0.0) gradient += most * secant_of(speed_[q], group.slow).slope * slip_[q];
-  return gradient;
-}
-
-Mat6 ContactTerm::hessian_of(const Group& group, const Vec3& origin) const {
-  // Of each point: (k - a) n n^T + a 1 - b (f v^T + v f^T), f the direction of friction, v the slip.
-  Mat6 sum = Mat6::Zero();
-  double all = 0.0;
-  Vec3 first = Vec3::Zero();
-  Mat3 second = Mat3::Zero();
-  for (std::uint32_t q = group.begin; q < group.end; ++q) {
-    const Vec3 x = points_->point[q] - origin;
-    const Vec3& n = points_->normal[q];
-    Vec6 normal;
-    normal << n, x.cross(n);
-    const double most = group.friction * lagged_[q], stiffness = normal_stiffness(group, q);
-    if (!(most > 0.0)) {
-      sum.noalias() += (stiffness * normal) * normal.transpose();
-      continue;
-    }
-    const Vec3 &v = slip_[q], &f = direction_[q];
-    const Secant secant = secant_of(speed_[q], group.slow);
-    const double scale = most * rule_.slip_factor / rule_.h, a = scale * secant.slope;
-    Vec6 along, direction;
-    along << v, x.cross(v);
-    direction << f, x.cross(f);
-    const Vec6 scaled = (-0.5 * scale * secant.fall) * along;
-    sum.noalias() += ((stiffness - a) * normal) * normal.transpose();
-    sum.noalias() += scaled * direction.transpose();
-    sum.noalias() += direction * scaled.transpose();
-    all += a;
-    first += a * x;
-    second += a * x * x.transpose();
-  }
-  sum.topLeftCorner<3, 3>() += all * Mat3::Identity();
-  sum.topRightCorner<3, 3>() -= cross_matrix(first);
-  sum.bottomLeftCorner<3, 3>() += cross_matrix(first);
-  sum.bottomRightCorner<3, 3>() += second.trace() * Mat3::Identity() - second;
-  return sum;
-}
-
 double ContactTerm::lag_friction(const ParticleState& pose) {
   if (empty()) return 0.0;
   place(pose);
   double change = 0.0, all = 0.0;
   for (const Group& group : groups_) {
-    for (std::uint32_t q = group.begin; q < group.end; ++q) {
-      const double force = normal_force(group, q);
-      change += std::abs(force - lagged_[q]);
-      all += force;
-      lagged_[q] = force;
-    }
+    const LagSums sums = lag_forces(lanes_, group.lanes);
+    change += sums.change;
+    all += sums.all;
   }
   scale_splits();
   return all > 0.0 ? change / all : 0.0;
@@ -367,13 +273,7 @@ double ContactTerm::value(const ParticleState& pose) {
   if (empty()) return 0.0;
   place(pose);
   double sum = 0.0;
-  for (const Group& group : groups_) {
-    for (std::uint32_t q = group.begin; q < group.end; ++q) {
-      sum += normal_potential(group, q);
-      const double most = group.friction * lagged_[q];
-      if (most > 0.0) sum += most * group.slow * rule_.h / rule_.slip_factor * mollified(speed_[q] / group.slow);
-    }
-  }
+  for (const Group& group : groups_) sum += potential_of(lanes_, group.lanes, rule_.slip_factor / rule_.h);
   for (std::size_t k = 0; k < points_->pair.size(); ++k) {
     for (std::uint32_t s = points_->pair[k].split_begin; s < points_->pair[k].split_end; ++s) {
       const std::uint32_t t = split_entry_[s];
@@ -389,12 +289,7 @@ void ContactTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradi
   std::vector<Vec3> force(touched_.size(), Vec3::Zero()), torque(touched_.size(), Vec3::Zero());
   const ContactPoints& p = *points_;
   for (const Group& group : groups_) {
-    Vec3 sum = Vec3::Zero(), moment = Vec3::Zero();  // about the group's origin
-    for (std::uint32_t q = group.begin; q < group.end; ++q) {
-      const Vec3 f = gradient_of(group, q);
-      sum += f;
-      moment += local_[q].cross(f);
-    }
+    const auto [sum, moment] = gradient_of(lanes_, group.lanes);
     for (std::uint32_t e = group.entry_begin; e < group.entry_end; ++e) {
       force[entry_[e]] += p.share[e] * sum;
       torque[entry_[e]] += p.share[e] * (moment + arm_[e].cross(sum));
@@ -438,7 +333,7 @@ void ContactTerm::add_hessian(const ParticleState& pose, std::size_t first_pair,
   const Vec3 origin = points_->point.front();  // near all arms, so that nothing cancels
   std::vector<Vec3> centre(touched_.size(), origin);
   for (const Group& group : groups_) {
-    spread(group, hessian_of(group, origin));
+    spread(group, stiffness_of(lanes_, group.lanes, group.origin - origin, rule_.slip_factor / rule_.h));
     for (std::uint32_t e = group.entry_begin; e < group.entry_end; ++e) centre[entry_[e]] = group.origin - arm_[e];
   }
   // Twists about `origin` from the displacement and the rotation of each particle.
@@ -449,43 +344,36 @@ void ContactTerm::add_hessian(const ParticleState& pose, std::size_t first_pair,
   }
   for (std::size_t t = 0; t < touched_.size(); ++t) hessian.add_particle(touched_[t], map[t].transpose() * diagonal_[t] * map[t]);
   for (std::size_t c = 0; c < coupled_.size(); ++c) {
-    const auto local = [&](std::uint32_t i) {
-      return static_cast<std::size_t>(std::lower_bound(touched_.begin(), touched_.end(), i) - touched_.begin());
-    };
     const auto [low, high] = coupled_[c];
-    hessian.add_coupling(first_pair + c, map[local(high)].transpose() * off_diagonal_[c] * map[local(low)]);
+    hessian.add_coupling(first_pair + c, map[rank_[high]].transpose() * off_diagonal_[c] * map[rank_[low]]);
   }
 }
 
 double ContactTerm::predict_friction(const Eigen::VectorXd& correction) {
   if (empty()) return 0.0;
   const ContactPoints& p = *points_;
-  next_direction_ = direction_;
-  const double factor = rule_.slip_factor / rule_.h;
+  lanes_.next_direction = lanes_.direction;
   double largest = 0.0;
   for (const Group& group : groups_) {
-    if (!(group.friction > 0.0)) continue;
-    Vec3 moved = Vec3::Zero(), turning = Vec3::Zero();
+    if (!(group.lanes.friction > 0.0)) continue;
+    Twist twist;
     for (std::uint32_t e = group.entry_begin; e < group.entry_end; ++e) {
       const auto row = static_cast<Eigen::Index>(6) * p.particle[e];
-      moved += p.share[e] * (correction.segment<3>(row) + correction.segment<3>(row + 3).cross(arm_[e]));
-      turning += p.share[e] * correction.segment<3>(row + 3);
+      twist.moved += p.share[e] * (correction.segment<3>(row) + correction.segment<3>(row + 3).cross(arm_[e]));
+      twist.turning += p.share[e] * correction.segment<3>(row + 3);
     }
-    for (std::uint32_t q = group.begin; q < group.end; ++q) {
-      if (!(lagged_[q] > 0.0)) continue;
-      const Vec3 u = moved + turning.cross(local_[q]);
-      const Vec3 &v = slip_[q], change = factor * (u - u.dot(p.normal[q]) * p.normal[q]);
-      const Secant secant = secant_of(speed_[q], group.slow);
-      const Vec3 next = secant.slope * (v + change) - secant.fall * v.dot(change) * direction_[q];
-      next_direction_[q] = next / std::max(1.0, next.norm());
-      largest = std::max(largest, change.squaredNorm());
-    }
+    largest = std::max(largest, predict_directions(lanes_, group.lanes, twist, rule_.slip_factor / rule_.h) / group.lanes.slow);
   }
-  return std::sqrt(largest);
+  return largest;
 }
 
 void ContactTerm::turn_friction(double share) {
-  for (std::size_t q = 0; q < direction_.size(); ++q) direction_[q] += share * (next_direction_[q] - direction_[q]);
+  const auto turn = [share](std::vector<double>& now, const std::vector<double>& next) {
+    for (std::size_t q = 0; q < now.size(); ++q) now[q] += share * (next[q] - now[q]);
+  };
+  turn(lanes_.direction.x, lanes_.next_direction.x);
+  turn(lanes_.direction.y, lanes_.next_direction.y);
+  turn(lanes_.direction.z, lanes_.next_direction.z);
 }
 
 void ContactTerm::finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger, std::vector<ContactPairLoad>& pairs) {
@@ -494,22 +382,17 @@ void ContactTerm::finish(const ParticleState& pose, double dt, Loads& loads, Led
   place(pose);
   const ContactPoints& p = *points_;
   for (const Group& group : groups_) {
-    Vec3 sum = Vec3::Zero(), moment = Vec3::Zero();  // about the group's origin
+    const Wrench gradient = gradient_of(lanes_, group.lanes);
+    const Vec3 sum = -gradient.force, moment = -gradient.moment;  // about the group's origin
+    // The impulse does the work of the mean of the velocities before and after it.
+    const PowerSums powers = powers_of(lanes_, group.lanes, group.twist, 0.5 * rule_.end_factor / rule_.h, 0.5 * (2.0 - rule_.end_factor));
     ContactPairLoad& pair = pairs[group.pair];
-    const double led = leads(group);
-    for (std::uint32_t q = group.begin; q < group.end; ++q) {
-      const Vec3 f = -gradient_of(group, q), dissipative = f + elastic_force(q) * p.normal[q];
-      sum += f;
-      moment += local_[q].cross(f);
-      // The impulse does the work of the mean of the velocities before and after it.
-      const Vec3 v = 0.5 * (rule_.end_factor / rule_.h * displacement_[q] + (2.0 - rule_.end_factor) * start_velocity_[q]);
-      const double dissipated = -dt * dissipative.dot(v);
-      pair.dissipated += dissipated;
-      ledger.dissipated += dissipated;
-      if (led == 0.0) continue;
-      ledger.external_impulse -= dt * led * f;
-      ledger.external_angular_impulse -= dt * led * p.point[q].cross(f);
-      ledger.external_work -= dt * led * f.dot(p.obstacle_velocity[q]);
+    pair.dissipated += dt * powers.dissipated;
+    ledger.dissipated += dt * powers.dissipated;
+    if (const double led = leads(group); led != 0.0) {
+      ledger.external_impulse -= dt * led * sum;
+      ledger.external_angular_impulse -= dt * led * (group.origin.cross(sum) + moment);
+      ledger.external_work -= dt / rule_.h * powers.led;
     }
     pair.force += sum;
     for (std::uint32_t e = group.entry_begin; e < group.entry_end; ++e) {

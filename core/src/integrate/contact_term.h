@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "integrate/contact_lanes.h"
 #include "integrate/step_hessian.h"
 #include "supple/core/compliant_contact.h"
 #include "supple/core/integrate.h"
@@ -47,10 +48,15 @@ class ContactTerm {
   void add_gradient(const ParticleState& pose, Eigen::VectorXd& gradient);
   /// Adds the positive semi-definite Hessian at the pose. @param first_pair  index of `coupled()[0]` in the list of the matrix
   void add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian);
-  /// Directions of friction after this correction of the pose of the last `add_hessian`. @return the largest change of a slip [m/s]
+  /// Directions of friction after this correction of the pose of the last `add_hessian`. @return the largest change of a slip, over the
+  /// speed below which its friction fades out [1]
   double predict_friction(const Eigen::VectorXd& correction);
   /// Goes this share of the way to the predicted directions.
   void turn_friction(double share);
+
+  /// Touched particles, ascending, and the least speed below which friction on each fades out [m/s].
+  [[nodiscard]] const std::vector<std::uint32_t>& touched() const { return touched_; }
+  [[nodiscard]] const std::vector<double>& least_stick_speed() const { return least_stick_; }
 
   /// Adds the loads on particles at the pose; books what obstacles get and do, and what damping and friction take over `dt`.
   void finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger, std::vector<ContactPairLoad>& pairs);
@@ -63,12 +69,12 @@ class ContactTerm {
     std::uint32_t block = 0;                       ///< of its first pair of entries
     std::uint32_t pair = 0;
     Vec3 origin = Vec3::Zero();                    ///< its first point [m]
-    double friction = 0.0;                         ///< coefficient [1]
-    double damping = 0.0;                          ///< dissipation over the step [1/m]
-    double slow = 0.0;                             ///< speed below which friction fades out [m/s]
+    LaneGroup lanes;
+    Twist twist{};                                 ///< of A relative to B since the start, at the last call of `place`
   };
-  void find_touched();
+  void find_touched(std::size_t particles);
   void find_groups();
+  void fill_lanes(const ParticleSet& set, const ParticleState& predicted);
   void find_stick_speeds(const SlowSlip& slow);
   void find_coupled();
   /// Sums of pressures, without damping, over those at the predicted pose, by pair.
@@ -80,36 +86,24 @@ class ContactTerm {
   [[nodiscard]] double leads(const Group& group) const;
   /// Adds a stiffness about one origin of a group's points.
   void spread(const Group& group, const Mat6& stiffness);
-  [[nodiscard]] double normal_force(const Group& group, std::size_t q) const;
-  [[nodiscard]] double elastic_force(std::size_t q) const;  ///< without damping
-  [[nodiscard]] double normal_potential(const Group& group, std::size_t q) const;
-  [[nodiscard]] double normal_stiffness(const Group& group, std::size_t q) const;
-  [[nodiscard]] Vec3 gradient_of(const Group& group, std::size_t q) const;
-  /// Stiffness of a group against displacement and rotation about `origin`.
-  [[nodiscard]] Mat6 hessian_of(const Group& group, const Vec3& origin) const;
 
   const ContactPoints* points_ = nullptr;
   const ParticleState* start_ = nullptr;
   StepRule rule_;
   std::vector<double> stick_speed_;      // below which friction fades out, by pair [m/s]
   std::vector<std::uint32_t> touched_;   // particles, ascending
+  std::vector<std::uint32_t> rank_;      // index into `touched_`, by particle, where it is touched
+  std::vector<double> least_stick_;      // of the pairs of each touched particle [m/s]
   std::vector<std::uint32_t> entry_;     // index into `touched_`, by entry of the rows
   std::vector<Group> groups_;
   std::vector<Vec3> arm_;                // from the centres of its particles to a group's origin at the predicted pose, by entry of the group
-  std::vector<Vec3> local_;              // from its group's origin, by point
-  std::vector<double> offset_pressure_;  // p - g u_p . n [Pa], by point
-  std::vector<Vec3> start_velocity_;     // relative, at the begin, by point [m/s]
-  std::vector<double> lagged_;           // normal force, by point [N]
-  std::vector<Vec3> direction_, next_direction_;  // friction over its largest value, by point: dual variables [1]
+  ContactLanes lanes_;
   std::vector<std::uint32_t> split_entry_;  // index into `touched_`, of each load within bodies
   std::vector<Vec3> split_place_;        // centre of its particle at the predicted pose [m]
+  std::vector<double> split_base_;       // normal force at the predicted pose, without damping, by pair [N]
   std::vector<double> split_scale_;      // by pair, lagged [1]
   std::vector<Pose> placed_;             // of the touched particles, at the last call of `place`
   std::vector<Vec3> moved_, turned_;     // since the start, by touched particle [m], [rad]
-  std::vector<Vec3> displacement_;       // of A relative to B since the start, by point [m]
-  std::vector<double> approach_;         // its part along the normal [m]
-  std::vector<Vec3> slip_;               // velocity across the normal [m/s]
-  std::vector<double> speed_;            // of the slip [m/s]
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coupled_;
   std::vector<std::uint32_t> block_;     // of each pair of entries of each group, in order: into `coupled_`, or touched particle on the diagonal
   std::vector<Mat6> diagonal_, off_diagonal_;

@@ -67,16 +67,23 @@ class StepPotential {
     }
   }
 
-  /// Largest change of velocity by the forces that the last `differentiate` left over, turns at a distance of `length` [m/s].
-  [[nodiscard]] double residual_speed(double length) const {
-    double largest2 = 0.0;
+  /// Whether the forces that the last `differentiate` left over change the velocity of each particle by at most `share` of the speed below which
+  /// friction on it fades out, turns at a distance of `length`. Particles that touch nothing pass motion on to those that do.
+  [[nodiscard]] bool leaves_less_than(double share, double length) const {
+    const std::vector<std::uint32_t>& touched = buffers_.contact.touched();
+    const std::vector<double>& stick = buffers_.contact.least_stick_speed();
+    if (touched.empty()) return true;
+    const double least = *std::min_element(stick.begin(), stick.end());
+    std::size_t t = 0;
     for (std::size_t i = 0; i < set_.size(); ++i) {
+      while (t < touched.size() && touched[t] < i) ++t;
+      const double most = share * (t < touched.size() && touched[t] == i ? stick[t] : least) / h_;
       const auto row = static_cast<Eigen::Index>(6 * i);
       const double speed2 = (1.0 / set_.mass[i] * buffers_.gradient.segment<3>(row)).squaredNorm();
       const double spin2 = (buffers_.pose.orientation[i].conjugate() * Vec3(buffers_.gradient.segment<3>(row + 3))).cwiseQuotient(set_.inertia[i]).squaredNorm();
-      largest2 = std::max({largest2, speed2, length * length * spin2});
+      if (!(std::max(speed2, length * length * spin2) <= most * most)) return false;
     }
-    return h_ * std::sqrt(largest2);
+    return true;
   }
 
   /// Solves H correction = -gradient. The exact Hessian is taken where it is positive definite.
@@ -174,14 +181,13 @@ void move(const ParticleState& pose, const Eigen::VectorXd& correction, double s
 }
 
 /// Newton's method from `buffers.pose`, which ends at the minimum; `buffers.laws` are the loads there.
-/// @param speed_error  of particles that touch something, by the forces that are left [m/s]
-void minimise(const IntegratorSettings& settings, double speed_error, StepPotential& potential, ImplicitBuffers& buffers,
-              StepReport& report) {
+void minimise(const IntegratorSettings& settings, StepPotential& potential, ImplicitBuffers& buffers, StepReport& report) {
   constexpr double kDescent = 1e-4;      // Armijo's share of the descent that the gradient promises
   constexpr double kRoundOff = 1e-14;    // of the potential
   constexpr double kLargestTurn = 0.5;   // [rad] in one correction
   constexpr int kMostHalvings = 30;
   constexpr int kMostLags = 8;           // times that friction follows the normal forces
+  constexpr double kOfStickSpeed = 5e-3; // velocities at the end of a step tell what holds to a hundredth of the friction
   constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
   report.within_tolerance = false;
   double value = 0.0;
@@ -208,7 +214,7 @@ void minimise(const IntegratorSettings& settings, double speed_error, StepPotent
     // The gain of a small correction may be less than the potential's rounding errors.
     const double slips = buffers.contact.predict_friction(buffers.correction);
     const bool small = report.last_correction <= settings.tolerance;
-    const bool sure = small && slips <= speed_error;
+    const bool sure = small && slips <= kOfStickSpeed;
     const double slope = buffers.gradient.dot(buffers.correction);
     const double angle = largest_angle(buffers.correction);
     double share = angle > kLargestTurn ? kLargestTurn / angle : 1.0;
@@ -227,7 +233,7 @@ void minimise(const IntegratorSettings& settings, double speed_error, StepPotent
     value = next;
     begin_at_pose();
     // Friction is so steep in the slip that forces, and with them velocities, may err where the pose does not.
-    if (small && (buffers.contact.empty() || potential.residual_speed(settings.length) <= speed_error || is_rounding(buffers.correction, buffers.pose))) {
+    if (small && (buffers.contact.empty() || potential.leaves_less_than(kOfStickSpeed, settings.length) || is_rounding(buffers.correction, buffers.pose))) {
       report.within_tolerance = true;
       return;
     }
@@ -383,8 +389,7 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
   guess(problem, time + h, h, potential, buffers);
   buffers.damping.begin(set, interactions, buffers.start, buffers.pose, h, midpoint);
-  constexpr double kOfStickSpeed = 5e-3;  // velocities at the end of a step tell what holds to a hundredth of the friction
-  minimise(settings, problem.contact != nullptr ? kOfStickSpeed * problem.contact->stick_speed : 0.0, potential, buffers, report);
+  minimise(settings, potential, buffers, report);
 
   const ParticleState& start = buffers.start;
   buffers.damping.finish(buffers.pose, dt, buffers.laws, ledger);
