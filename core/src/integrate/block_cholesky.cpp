@@ -1,5 +1,7 @@
 #include "integrate/block_cholesky.h"
 
+#include <immintrin.h>
+
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
@@ -26,12 +28,25 @@ std::vector<std::uint32_t> order_of(std::size_t blocks, std::span<const std::pai
   return out;
 }
 
-/// c -= a b^T
+/// c -= a b^T, by columns of four and two rows.
 void subtract_product(const Mat6& a, const Mat6& b, Mat6& c) {
+  __m256d upper[6];
+  __m128d lower[6];
+  for (int k = 0; k < 6; ++k) {
+    upper[k] = _mm256_loadu_pd(a.data() + 6 * k);
+    lower[k] = _mm_loadu_pd(a.data() + 6 * k + 4);
+  }
   for (int j = 0; j < 6; ++j) {
-    Vec6 column = c.col(j);
-    for (int k = 0; k < 6; ++k) column -= b(j, k) * a.col(k);
-    c.col(j) = column;
+    double* const column = c.data() + 6 * j;
+    __m256d four = _mm256_loadu_pd(column);
+    __m128d two = _mm_loadu_pd(column + 4);
+    for (int k = 0; k < 6; ++k) {
+      const __m256d factor = _mm256_set1_pd(b(j, k));
+      four = _mm256_fnmadd_pd(factor, upper[k], four);
+      two = _mm_fnmadd_pd(_mm256_castpd256_pd128(factor), lower[k], two);
+    }
+    _mm256_storeu_pd(column, four);
+    _mm_storeu_pd(column + 4, two);
   }
 }
 

@@ -35,6 +35,7 @@ void DampingTerm::begin(const ParticleSet& set, const Interactions& interactions
   start_ = &start;
   h_ = h;
   midpoint_ = midpoint;
+  placed_ = {};
   clear();
   double z = 0.0;
   for_each_damping(set, predicted, interactions, [&](std::uint32_t a, std::uint32_t b, const PairHessian& d) {
@@ -48,6 +49,12 @@ void DampingTerm::begin(const ParticleSet& set, const Interactions& interactions
 }
 
 void DampingTerm::place(const ParticleState& pose) {
+  const auto same = [](const Quat& a, const Quat& b) { return a.coeffs() == b.coeffs(); };
+  if (placed_.position == pose.position && std::equal(placed_.orientation.begin(), placed_.orientation.end(), pose.orientation.begin(), pose.orientation.end(), same)) {
+    return;
+  }
+  placed_.position = pose.position;
+  placed_.orientation = pose.orientation;
   moved_.resize(pose.size());
   turned_.resize(pose.size());
   for (std::size_t i = 0; i < pose.size(); ++i) {
@@ -69,7 +76,7 @@ double DampingTerm::value(const ParticleState& pose) {
   double sum = 0.0;
   for (std::size_t k = 0; k < pair_.size(); ++k) {
     const Vec12 v = velocity(pair_[k], moved(k));
-    sum += v.dot(pair_[k].matrix * v);
+    sum += v.dot(pair_[k].matrix.lazyProduct(v));
   }
   return 0.5 * h_ / factor_ * sum;
 }
@@ -80,7 +87,7 @@ void DampingTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradi
   std::vector<Vec3> force(pose.size(), Vec3::Zero()), torque(pose.size(), Vec3::Zero());
   for (std::size_t k = 0; k < pair_.size(); ++k) {
     const auto [a, b] = coupled_[k];
-    const Vec12 load = pair_[k].matrix * velocity(pair_[k], moved(k));
+    const Vec12 load = pair_[k].matrix.lazyProduct(velocity(pair_[k], moved(k)));
     force[a] += load.segment<3>(0);
     torque[a] += load.segment<3>(3);
     force[b] += load.segment<3>(6);
@@ -102,10 +109,10 @@ void DampingTerm::add_hessian(const ParticleState& pose, std::size_t first_pair,
   for (std::size_t k = 0; k < pair_.size(); ++k) {
     const auto [a, b] = coupled_[k];
     PairHessian h = factor_ / h_ * pair_[k].matrix;
-    h.middleCols<3>(3) = (h.middleCols<3>(3) * map[a]).eval();
-    h.middleCols<3>(9) = (h.middleCols<3>(9) * map[b]).eval();
-    h.middleRows<3>(3) = (map[a].transpose() * h.middleRows<3>(3)).eval();
-    h.middleRows<3>(9) = (map[b].transpose() * h.middleRows<3>(9)).eval();
+    h.middleCols<3>(3) = h.middleCols<3>(3).lazyProduct(map[a]).eval();
+    h.middleCols<3>(9) = h.middleCols<3>(9).lazyProduct(map[b]).eval();
+    h.middleRows<3>(3) = map[a].transpose().lazyProduct(h.middleRows<3>(3)).eval();
+    h.middleRows<3>(9) = map[b].transpose().lazyProduct(h.middleRows<3>(9)).eval();
     hessian.add_pair(first_pair + k, h);
   }
 }
@@ -115,7 +122,7 @@ void DampingTerm::finish(const ParticleState& pose, double dt, Loads& loads, Led
   place(pose);
   for (std::size_t k = 0; k < pair_.size(); ++k) {
     const auto [a, b] = coupled_[k];
-    const Vec12 s = moved(k), load = -pair_[k].matrix * velocity(pair_[k], s);
+    const Vec12 s = moved(k), load = -pair_[k].matrix.lazyProduct(velocity(pair_[k], s));
     const Vec3 force = load.segment<3>(6);
     // The moment of the two forces at the pose itself; D has that of the predicted one.
     const Vec3 rest = 0.5 * (load.segment<3>(3) + load.segment<3>(9) + (pose.position[b] - pose.position[a]).cross(force));

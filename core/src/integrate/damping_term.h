@@ -44,7 +44,7 @@ class DampingTerm {
     PairHessian matrix;
     Vec12 start = Vec12::Zero();  ///< velocities at the start
   };
-  /// Moves all particles to the pose.
+  /// Moves all particles to the pose; does nothing where they are there.
   void place(const ParticleState& pose);
   /// Displacement and rotation of both particles of a pair since the start.
   [[nodiscard]] Vec12 moved(std::size_t k) const;
@@ -54,6 +54,7 @@ class DampingTerm {
   double h_ = 0.0;
   double factor_ = 1.0;    ///< t
   bool midpoint_ = false;
+  ParticleState placed_;   ///< places and orientations of the last call of `place`
   std::vector<Vec3> moved_, turned_;  ///< since the start, by particle, at the last call of `place` [m], [rad]
   std::vector<Damped> pair_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coupled_;
