@@ -67,9 +67,10 @@ class StepPotential {
     }
   }
 
-  /// Whether the forces that the last `differentiate` left over change the velocity of each particle by at most `share` of the speed below which
-  /// friction on it fades out, turns at a distance of `length`. Particles that touch nothing pass motion on to those that do.
-  [[nodiscard]] bool leaves_less_than(double share, double length) const {
+  /// Whether the forces that the last `differentiate` left over change the velocity of each particle, turns at a distance of `length`, by at most
+  /// `of_stick` of the speed below which friction on it fades out, or `of_friction` of what friction at most changes it by. Particles that touch nothing
+  /// pass motion on to those that do.
+  [[nodiscard]] bool leaves_less_than(double of_stick, double of_friction, double length) const {
     const std::vector<std::uint32_t>& touched = buffers_.contact.touched();
     const std::vector<double>& stick = buffers_.contact.least_stick_speed();
     if (touched.empty()) return true;
@@ -77,11 +78,13 @@ class StepPotential {
     std::size_t t = 0;
     for (std::size_t i = 0; i < set_.size(); ++i) {
       while (t < touched.size() && touched[t] < i) ++t;
-      const double most = share * (t < touched.size() && touched[t] == i ? stick[t] : least) / h_;
+      const bool touches = t < touched.size() && touched[t] == i;
+      const double speed = of_stick * (touches ? stick[t] : least);
+      const double most = std::max(speed / h_, touches ? of_friction * buffers_.contact.most_friction()[t] / set_.mass[i] : 0.0);
       const auto row = static_cast<Eigen::Index>(6 * i);
-      const double speed2 = (1.0 / set_.mass[i] * buffers_.gradient.segment<3>(row)).squaredNorm();
+      const double push2 = (1.0 / set_.mass[i] * buffers_.gradient.segment<3>(row)).squaredNorm();
       const double spin2 = (buffers_.pose.orientation[i].conjugate() * Vec3(buffers_.gradient.segment<3>(row + 3))).cwiseQuotient(set_.inertia[i]).squaredNorm();
-      if (!(std::max(speed2, length * length * spin2) <= most * most)) return false;
+      if (!(std::max(push2, length * length * spin2) <= most * most)) return false;
     }
     return true;
   }
@@ -188,6 +191,7 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
   constexpr int kMostHalvings = 30;
   constexpr int kMostLags = 8;           // times that friction follows the normal forces
   constexpr double kOfStickSpeed = 5e-3; // velocities at the end of a step tell what holds to a hundredth of the friction
+  constexpr double kOfFriction = 100.0;  // of the tolerance: share of it that may be left
   constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
   report.within_tolerance = false;
   double value = 0.0;
@@ -233,7 +237,7 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
     value = next;
     begin_at_pose();
     // Friction is so steep in the slip that forces, and with them velocities, may err where the pose does not.
-    if (small && (buffers.contact.empty() || potential.leaves_less_than(kOfStickSpeed, settings.length) || is_rounding(buffers.correction, buffers.pose))) {
+    if (small && (buffers.contact.empty() || potential.leaves_less_than(kOfStickSpeed, kOfFriction * settings.tolerance, settings.length) || is_rounding(buffers.correction, buffers.pose))) {
       report.within_tolerance = true;
       return;
     }
