@@ -54,10 +54,13 @@ HWY_INLINE std::array<double, K> sum_over(const LaneGroup& group, const Body& bo
     for (std::size_t q = group.begin + lane; q < group.end; q += kContactLanes) body(q, sums);
     for (std::size_t k = 0; k < K; ++k) hn::Store(sums[k], D(), lanes[k] + lane);
   }
+  const hn::FixedTag<double, 4> four;
+  const hn::FixedTag<double, 2> two;
   std::array<double, K> totals;
   for (std::size_t k = 0; k < K; ++k) {
-    const double* const l = lanes[k];
-    totals[k] = ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]));
+    const auto halves = hn::Add(hn::Load(four, lanes[k]), hn::Load(four, lanes[k] + 4));
+    const auto quarters = hn::Add(hn::LowerHalf(two, halves), hn::UpperHalf(two, halves));
+    totals[k] = hn::GetLane(quarters) + hn::ExtractLane(quarters, 1);
   }
   return totals;
 }
