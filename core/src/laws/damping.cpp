@@ -227,14 +227,16 @@ void for_each_damping(const ParticleSet& set, const ParticleState& state, const 
   for (const Friction& law : interactions.friction) {
     for (std::size_t bond = 0; bond < law.first.size(); ++bond) {
       const std::uint32_t a = law.first[bond], b = law.second[bond];
-      // Of the slip and the relative spin: see `add_friction_loads`.
-      Eigen::Matrix<double, 6, 12> relative = Eigen::Matrix<double, 6, 12>::Zero();
-      const Mat3 arm = 0.5 * cross_matrix(state.position[b] - state.position[a]);
-      relative.block<3, 3>(0, 0) = relative.block<3, 3>(3, 3) = -Mat3::Identity();
-      relative.block<3, 3>(0, 6) = relative.block<3, 3>(3, 9) = Mat3::Identity();
-      relative.block<3, 3>(0, 3) = relative.block<3, 3>(0, 9) = arm;
-      visit(a, b, law.linear * relative.topRows<3>().transpose() * relative.topRows<3>() +
-                      law.angular * relative.bottomRows<3>().transpose() * relative.bottomRows<3>());
+      // The slip dx_B - dx_A + arm (dtheta_A + dtheta_B) and the relative spin: see `add_friction_loads`.
+      const Mat3 arm = law.linear * 0.5 * cross_matrix(state.position[b] - state.position[a]);
+      const Mat3 slide = law.linear * Mat3::Identity(), spin = law.angular * Mat3::Identity();
+      const Mat3 both = 0.5 * cross_matrix(state.position[b] - state.position[a]).transpose() * arm;
+      PairHessian d;
+      d << slide, -arm, -slide, -arm,                                               //
+          -arm.transpose(), both + spin, arm.transpose(), both - spin,              //
+          -slide, arm, slide, arm,                                                  //
+          -arm.transpose(), both - spin, arm.transpose(), both + spin;
+      visit(a, b, d);
     }
   }
   for_each_stiffness_damping(set, state, interactions, visit);

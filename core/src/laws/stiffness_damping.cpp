@@ -1,5 +1,5 @@
 // Rayleigh's damping of deformation, pair by pair.
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <cmath>
 
 #include "laws/cross_matrix.h"
@@ -9,7 +9,8 @@
 namespace supple::core {
 namespace {
 
-using Mat12 = Eigen::Matrix<double, 12, 12>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Vec12 = Eigen::Matrix<double, 12, 1>;
 
 /// The damping time of a pair, 0 unless both are of one object that has one.
@@ -23,22 +24,55 @@ double damping_time(const ParticleSet& set, const std::vector<StiffnessDamping>&
   return time;
 }
 
-/// K without the rigid motions of the pair: P^T K P with P R = 0. Prestress would make a rotation feel forces.
-Mat12 deformation_stiffness(const Vec3& r, const PairHessian& k) {
-  const double d = r.norm();
-  // Rigid motions of the pair about A; rotations are scaled by the distance d.
-  Eigen::Matrix<double, 12, 6> rigid = Eigen::Matrix<double, 12, 6>::Zero();
-  rigid.block<3, 3>(0, 0).setIdentity();
-  rigid.block<3, 3>(6, 0).setIdentity();
-  rigid.block<3, 3>(3, 3).setIdentity();
-  rigid.block<3, 3>(9, 3).setIdentity();
-  rigid.block<3, 3>(6, 3) = -cross_matrix(r);
-  Vec12 weight = Vec12::Ones();
-  weight.segment<3>(3).setConstant(d * d);
-  weight.segment<3>(9).setConstant(d * d);
-  const Eigen::Matrix<double, 6, 12> weighted = rigid.transpose() * weight.asDiagonal();
-  const Mat12 keep = Mat12::Identity() - rigid * (weighted * rigid).llt().solve(weighted);
-  return keep.transpose() * k * keep;
+/// The deformation of a pair: its motion without the rigid ones, which feel no damping (prestress would make a rotation feel forces). A motion is a sum of
+/// rigid ones and of N q, where q = (u, v) moves the particles by (-u, u) and turns them by (c x u - v, c x u + v), c = -r / (2 d^2): the motions
+/// that are orthogonal to the rigid ones where turns count by the distance d. A motion s has q = B^T s with
+///   u = G (s_xB - s_xA) + 0.2 r x (s_thetaA + s_thetaB),  v = (s_thetaB - s_thetaA) / 2,  G = 0.4 (1 - r r^T / d^2) + 0.5 r r^T / d^2.
+class Deformation {
+ public:
+  explicit Deformation(const Vec3& r)
+      : r_(r), share_(0.4 * Mat3::Identity() + 0.1 / r.squaredNorm() * r * r.transpose()), turn_(-0.5 / r.squaredNorm() * cross_matrix(r)) {}
+
+  /// N^T K N
+  [[nodiscard]] Mat6 stiffness(const PairHessian& k) const {
+    Eigen::Matrix<double, 12, 6> columns;
+    columns.leftCols<3>() = k.middleCols<3>(6) - k.middleCols<3>(0) + (k.middleCols<3>(3) + k.middleCols<3>(9)).lazyProduct(turn_);
+    columns.rightCols<3>() = k.middleCols<3>(9) - k.middleCols<3>(3);
+    Mat6 out;
+    out.topRows<3>() = columns.middleRows<3>(6) - columns.middleRows<3>(0) + turn_.transpose().lazyProduct(columns.middleRows<3>(3) + columns.middleRows<3>(9));
+    out.bottomRows<3>() = columns.middleRows<3>(9) - columns.middleRows<3>(3);
+    return out;
+  }
+  /// B^T s
+  [[nodiscard]] Vec6 of(const Vec12& s) const {
+    const Vec3 apart = s.segment<3>(6) - s.segment<3>(0), turned = s.segment<3>(3) + s.segment<3>(9);
+    Vec6 q;
+    q.head<3>() = share_ * apart + 0.2 * r_.cross(turned);
+    q.tail<3>() = 0.5 * (s.segment<3>(9) - s.segment<3>(3));
+    return q;
+  }
+  /// B k
+  template <int columns>
+  [[nodiscard]] Eigen::Matrix<double, 12, columns> loads(const Eigen::Matrix<double, 6, columns>& k) const {
+    Eigen::Matrix<double, 12, columns> out;
+    out.template middleRows<3>(6) = share_.lazyProduct(k.template topRows<3>());
+    out.template middleRows<3>(0) = -out.template middleRows<3>(6);
+    const Eigen::Matrix<double, 3, columns> moment = (-0.2 * cross_matrix(r_)).lazyProduct(k.template topRows<3>());
+    out.template middleRows<3>(3) = moment - 0.5 * k.template bottomRows<3>();
+    out.template middleRows<3>(9) = moment + 0.5 * k.template bottomRows<3>();
+    return out;
+  }
+
+ private:
+  Vec3 r_;
+  Mat3 share_, turn_;
+};
+
+/// K without the rigid motions of the pair: B N^T K N B^T.
+PairHessian deformation_stiffness(const Vec3& r, const PairHessian& k) {
+  const Deformation deformation(r);
+  const Eigen::Matrix<double, 12, 6> half = deformation.loads(deformation.stiffness(k));
+  return deformation.loads<12>(half.transpose());
 }
 
 Vec12 velocities(const ParticleSet& set, const ParticleState& state, std::size_t a, std::size_t b) {
@@ -59,33 +93,30 @@ Balanced balance(const Vec3& r, const Vec12& load) {
   return {force_b, torque_a, -torque_a - r.cross(force_b)};
 }
 
-/// M^(1/2) or its inverse for one particle; pinned directions have no inverse mass.
-Mat12 mass_root(const ParticleSet& set, const ParticleState& state, std::size_t a, std::size_t b, bool inverse) {
-  Mat12 root = Mat12::Zero();
+/// Inverse inertia in world axes, zero in what is held.
+Mat3 mobility(const ParticleSet& set, const ParticleState& state, std::size_t i) {
+  const Mat3 q = state.orientation[i].toRotationMatrix();
+  Mat3 inverse = q * set.inertia[i].cwiseInverse().asDiagonal() * q.transpose();
+  if (set.pinned[i] == 0) return inverse;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (free_rotation(set.pinned[i], Vec3::Unit(axis)) != Vec3::Zero()) continue;
+    inverse.row(axis).setZero();
+    inverse.col(axis).setZero();
+  }
+  return inverse;
+}
+
+/// M^-1 s of both particles, zero in what is held.
+Eigen::Matrix<double, 12, 6> moved_by(const ParticleSet& set, const ParticleState& state, std::size_t a, std::size_t b, const Eigen::Matrix<double, 12, 6>& loads) {
+  Eigen::Matrix<double, 12, 6> out;
   int at = 0;
   for (const std::size_t i : {a, b}) {
-    Vec3 inertia = set.inertia[i].cwiseSqrt();
-    double mass = std::sqrt(set.mass[i]);
-    if (inverse) {
-      inertia = inertia.cwiseInverse();
-      mass = 1.0 / mass;
-    }
-    const Mat3 q = state.orientation[i].toRotationMatrix();
-    root.block<3, 3>(at, at) = mass * Mat3::Identity();
-    root.block<3, 3>(at + 3, at + 3) = q * inertia.asDiagonal() * q.transpose();
-    for (int axis = 0; axis < 3; ++axis) {
-      if (free_translation(set.pinned[i], Vec3::Unit(axis)) == Vec3::Zero()) {
-        root.row(at + axis).setZero();
-        root.col(at + axis).setZero();
-      }
-      if (free_rotation(set.pinned[i], Vec3::Unit(axis)) == Vec3::Zero()) {
-        root.row(at + 3 + axis).setZero();
-        root.col(at + 3 + axis).setZero();
-      }
-    }
+    const Vec3 free = free_translation(set.pinned[i], Vec3::Ones()) / set.mass[i];
+    out.middleRows<3>(at) = free.asDiagonal() * loads.middleRows<3>(at);
+    out.middleRows<3>(at + 3) = mobility(set, state, i).lazyProduct(loads.middleRows<3>(at + 3));
     at += 6;
   }
-  return root;
+  return out;
 }
 
 /// Velocities that pins of a pair prescribe; zero of what is free.
@@ -105,29 +136,25 @@ struct DampedPair {
   PairHessian hessian;
 };
 
+/// q' = -A q / h for the deformation q of the velocities, A = h B^T M^-1 B N^T K N, to second order as in friction.
 void damp(const ParticleSet& set, const DampedPair& pair, double h, ParticleState& state, Ledger& ledger) {
   const auto& [a, b, hessian] = pair;
   const Vec3 r = state.position[b] - state.position[a];
-  const Mat12 k = deformation_stiffness(r, hessian);
-  const Mat12 light = mass_root(set, state, a, b, true);
-  const Vec12 motion = velocities(set, state, a, b);
-  const Vec12 before = mass_root(set, state, a, b, false) * motion;
-  const Vec12 led = led_velocities(set, motion, a, b);
-  // y' = -Z y / h in y = M^(1/2) velocity, to second order as in friction.
-  const Mat12 z = h * light * k * light;
-  const Mat12 one = Mat12::Identity();
-  Vec12 drive = before + 0.5 * z * before;
-  if (!led.isZero(0.0)) {
-    const Vec12 push = -h * light * (k * led);  // with y' = -(Z y - push) / h: the mean has (exp(-Z) - 1 + Z) / Z^2 of it
-    drive += 0.5 * (push + z * push);
-  }
-  const Vec12 mean = (one + z + 0.5 * z * z).llt().solve(drive);
-  const Vec12 impulse = led.isZero(0.0) ? Vec12(-h * k * (light * mean)) : Vec12(-h * k * (light * mean + led));
-  const Balanced balanced = balance(r, impulse);
+  const Deformation deformation(r);
+  const Mat6 k = h * deformation.stiffness(hessian);
+  const Eigen::Matrix<double, 12, 6> loads = deformation.loads<6>(Mat6::Identity());
+  const Mat6 mobility = loads.transpose().lazyProduct(moved_by(set, state, a, b, loads));
+  const Vec12 motion = velocities(set, state, a, b), led = led_velocities(set, motion, a, b);
+  const Vec6 before = deformation.of(motion - led), prescribed = deformation.of(led);
+  const Mat6 z = mobility.lazyProduct(k);
+  // Of what is prescribed the mean has (exp(-A) - 1 + A) / A^2.
+  const Vec6 drive = before + 0.5 * z * (before - prescribed - z * prescribed);
+  const Vec6 mean = (Mat6::Identity() + z + 0.5 * z.lazyProduct(z)).partialPivLu().solve(drive);
+  const Vec6 impulse = -k * (mean + prescribed);
+  const Balanced balanced = balance(r, deformation.loads<1>(impulse));
   apply_impulse(set, a, -balanced.force_b, balanced.torque_a, state, ledger);
   apply_impulse(set, b, balanced.force_b, balanced.torque_b, state, ledger);
-  const Vec12 gain = light * impulse;
-  ledger.dissipated -= gain.dot(before) + 0.5 * gain.squaredNorm() + impulse.dot(led);
+  ledger.dissipated -= impulse.dot(before + prescribed) + 0.5 * impulse.dot(mobility * impulse);
 }
 
 }  // namespace

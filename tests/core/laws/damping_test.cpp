@@ -1,9 +1,12 @@
 // Friction between particles and the drag of a medium.
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "core/support.h"
+#include "laws/damping.h"
+#include "laws/pair_hessians.h"
 #include "supple/core/integrate.h"
 
 namespace supple::core {
@@ -190,6 +193,99 @@ Damped make_prestressed(double time, std::uint64_t seed) {
   for (Vec3& x : d.p.state.position) x += draw.vector(0.2);
   d.interactions.stiffness_damping.push_back({.object = 0, .time = time});
   return d;
+}
+
+using Mat12 = Eigen::Matrix<double, 12, 12>;
+using Vec12 = Eigen::Matrix<double, 12, 1>;
+
+/// Two bonded particles away from rest, that move at random, without and with pins.
+Damped make_pair(std::uint64_t seed, std::uint8_t pinned) {
+  Draw draw(seed);
+  Damped d;
+  for (int i = 0; i < 2; ++i) {
+    d.p.add(draw.vector(1.0), draw.uniform(0.5, 2.0), 0.4);
+    d.p.set.inertia.back() = Vec3::Constant(0.4) + draw.vector(0.2);
+    d.p.state.orientation.back() = draw.rotation();
+  }
+  d.interactions.bond_frame.push_back(test::bond_frames(d.p, 30.0, 4.0, 1));
+  for (std::size_t i = 0; i < 2; ++i) {
+    d.p.state.position[i] += draw.vector(0.2);
+    d.p.state.velocity[i] = draw.vector(1.0);
+    d.p.state.angular_momentum[i] = draw.vector(0.5);
+  }
+  d.p.set.pinned[1] = pinned;
+  d.interactions.stiffness_damping.push_back({.object = 0, .time = 1.0});
+  return d;
+}
+
+/// time P^T K P, P the projector along the rigid motions of the pair, turns weighted by its length.
+Mat12 projected(const Damped& d) {
+  const Vec3 r = d.p.state.position[1] - d.p.state.position[0];
+  Mat12 k = Mat12::Zero();
+  for_each_hessian(d.p.set, d.p.state, d.interactions, HessianKind::PositiveSemiDefinite,
+                   [&](std::uint32_t, std::uint32_t, const PairHessian& h) { k += h; });
+  Eigen::Matrix<double, 12, 6> rigid = Eigen::Matrix<double, 12, 6>::Zero();
+  for (const int row : {0, 6}) rigid.block<3, 3>(row, 0).setIdentity();
+  for (const int row : {3, 9}) rigid.block<3, 3>(row, 3).setIdentity();
+  rigid.block<3, 3>(6, 3) << 0.0, r.z(), -r.y(), -r.z(), 0.0, r.x(), r.y(), -r.x(), 0.0;
+  Vec12 weight = Vec12::Ones();
+  weight.segment<3>(3).setConstant(r.squaredNorm());
+  weight.segment<3>(9).setConstant(r.squaredNorm());
+  const Eigen::Matrix<double, 6, 12> weighted = rigid.transpose() * weight.asDiagonal();
+  const Mat12 keep = Mat12::Identity() - rigid * (weighted * rigid).inverse() * weighted;
+  return d.interactions.stiffness_damping.front().time * keep.transpose() * k * keep;
+}
+
+TEST(StiffnessDamping, IsTheStiffnessWithoutTheRigidMotions) {
+  for (std::uint64_t seed = 80; seed < 90; ++seed) {
+    const Damped d = make_pair(seed, 0);
+    const Mat12 expected = projected(d);
+    Mat12 found = Mat12::Zero();
+    for_each_damping(d.p.set, d.p.state, d.interactions, [&](std::uint32_t, std::uint32_t, const PairHessian& h) { found += h; });
+    EXPECT_LT((found - expected).norm(), 1e-13 * expected.norm());
+  }
+}
+
+TEST(StiffnessDamping, TakesTheVelocitiesOfAPairAsTwelveUnknownsDo) {
+  for (std::uint64_t seed = 90; seed < 110; ++seed) {
+    const bool pinned = seed % 2 == 1;
+    Damped d = make_pair(seed, pinned ? std::uint8_t{kPinPosition | kPinOrientation} : std::uint8_t{0});
+    const double h = seed % 3 == 0 ? 100.0 : 0.05;  // far longer and shorter than the pair is damped in
+    // y' = -Z y / h in y = M^(1/2) v by (1 + Z + Z^2 / 2)^-1.
+    Mat12 light = Mat12::Zero();
+    Vec12 motion;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto at = static_cast<Eigen::Index>(6 * i);
+      motion.segment<3>(at) = d.p.state.velocity[i];
+      motion.segment<3>(at + 3) = angular_velocity(d.p.set, d.p.state, i);
+      if (d.p.set.pinned[i] != 0) continue;
+      const Mat3 q = d.p.state.orientation[i].toRotationMatrix();
+      light.block<3, 3>(at, at) = Mat3::Identity() / std::sqrt(d.p.set.mass[i]);
+      light.block<3, 3>(at + 3, at + 3) = q * d.p.set.inertia[i].cwiseSqrt().cwiseInverse().asDiagonal() * q.transpose();
+    }
+    const Mat12 z = h * light * projected(d) * light;
+    Vec12 free = motion;
+    if (pinned) free.tail<6>().setZero();
+    Mat12 heavy = Mat12::Zero();
+    for (const int row : {0, 6}) {
+      if (row == 6 && pinned) continue;
+      heavy.block<3, 3>(row, row) = light.block<3, 3>(row, row).inverse();
+      heavy.block<3, 3>(row + 3, row + 3) = light.block<3, 3>(row + 3, row + 3).inverse();
+    }
+    const Vec12 led = motion - free;
+    const Vec12 push = -h * light * projected(d) * led, before = heavy * free;
+    const Mat12 one = Mat12::Identity();
+    const Vec12 after = (one + z + 0.5 * z * z).inverse() * (before + 0.5 * z * before + 0.5 * (push + z * push));
+    const Vec12 impulse = -h * projected(d) * (light * after + led);
+    const Vec12 expected = motion + light * light * impulse;
+    const double rounding = 1e-15 * (1.0 + z.squaredNorm());  // of the sum 1 + Z + Z^2 / 2
+    apply_stiffness_damping(d.p.set, d.interactions, h, PairOrder::Forward, d.p.state, d.ledger);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto at = static_cast<Eigen::Index>(6 * i);
+      EXPECT_LT((d.p.state.velocity[i] - expected.segment<3>(at)).norm(), rounding) << seed;
+      EXPECT_LT((angular_velocity(d.p.set, d.p.state, i) - expected.segment<3>(at + 3)).norm(), rounding) << seed;
+    }
+  }
 }
 
 TEST(StiffnessDamping, KeepsMomentumAndBooksExactlyTheEnergyItTakes) {

@@ -461,8 +461,16 @@ bool PanelSolver::choose() {
   order.erase(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(kept));
   std::sort(order.begin(), order.end());
   r_.chosen.clear();
-  for (const std::uint32_t i : order) r_.chosen.push_back(r_.panel[i]);
-  for (std::size_t n = order.size(); n-- > 0;) r_.panel.erase(r_.panel.begin() + order[n]);
+  std::size_t next = 0, left = 0;
+  for (std::size_t i = 0; i < r_.panel.size(); ++i) {
+    if (next < order.size() && order[next] == i) {
+      r_.chosen.push_back(r_.panel[i]);
+      ++next;
+    } else {
+      r_.panel[left++] = r_.panel[i];
+    }
+  }
+  r_.panel.resize(left);
   return true;
 }
 
