@@ -122,17 +122,27 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
 
 void StageProfile::scale() {
   cpu_s = apart_s + first_s;
-  if (timed > 1) cpu_s += later_s * static_cast<double>(calls - 1) / static_cast<double>(timed - 1);
+  if (timed > 1) cpu_s += later_s * static_cast<double>(calls - apart - 1) / static_cast<double>(timed - 1);
   cpu_s = std::max(cpu_s, 0.0);  // for very short times, without the duration of the clock reading
 }
 
-StageTimer::StageTimer(StageProfile& profile, bool timed) : profile_(profile), timed_(timed || profile.calls == 0) {
+void StageProfile::book(double seconds, bool stands_for_itself) {
+  if (stands_for_itself) {
+    ++apart;
+    apart_s += seconds;
+  } else {
+    (timed++ == 0 ? first_s : later_s) += seconds;
+  }
+}
+
+StageTimer::StageTimer(StageProfile& profile, StepTiming timing)
+    : profile_(profile), timing_(timing == StepTiming::None && profile.calls == 0 ? StepTiming::Sample : timing) {
   ++profile.calls;
-  if (timed_) begin_ = process_cpu_seconds();
+  if (timing_ != StepTiming::None) begin_ = process_cpu_seconds();
 }
 
 StageTimer::~StageTimer() {
-  if (timed_) (profile_.timed++ == 0 ? profile_.first_s : profile_.later_s) += process_cpu_seconds() - begin_ - process_cpu_clock_cost();
+  if (timing_ != StepTiming::None) profile_.book(process_cpu_seconds() - begin_ - process_cpu_clock_cost(), timing_ == StepTiming::Apart);
   profile_.scale();
 }
 

@@ -98,17 +98,24 @@ struct Frame {
   Frame(const Model& model, const std::vector<Body>& all);
 };
 
-/// Measures one call of a stage: the first one, and those of timed steps, which represent the others.
+/// Which stages of a step are measured.
+enum class StepTiming : std::uint8_t {
+  None,
+  Sample,  ///< it stands for steps that are not measured
+  Apart,   ///< it stands for itself
+};
+
+/// Measures one call of a stage: the first one, and those of steps that are measured.
 class StageTimer {
  public:
-  StageTimer(StageProfile& profile, bool timed);
+  StageTimer(StageProfile& profile, StepTiming timing);
   ~StageTimer();
   StageTimer(const StageTimer&) = delete;
   StageTimer& operator=(const StageTimer&) = delete;
 
  private:
   StageProfile& profile_;
-  bool timed_;
+  StepTiming timing_;
   double begin_ = 0.0;
 };
 
@@ -119,7 +126,7 @@ struct StageContext {
   const Executor& executor;
   Profile& profile;
   bool skip = true;
-  bool timed = false;                                 ///< stages are measured
+  StepTiming timing = StepTiming::None;               ///< of the stages
   const implicit::DelaunayMesher* delaunay = nullptr;
   const std::atomic<int>* interrupt = nullptr;        ///< see SimulationOptions::interrupt
   double time = 0.0;                                  ///< at which obstacles are placed [s]

@@ -1,6 +1,7 @@
 #include "simulation/simulation_impl.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "model/model_faults.h"
@@ -19,12 +20,14 @@ namespace supple::scenes {
 namespace {
 
 constexpr std::uint64_t kTimedEvery = 61;  // see StageProfile::cpu_s
+constexpr std::chrono::milliseconds kLongStep(1);  // a thousand readings of the clock
 
 /// Measured times of the stages of a step, each with two readings of the clock [s].
 double measured_inside(const Profile& profile) {
   double sum = 0.0;
   for (std::size_t s = 0; s < static_cast<std::size_t>(Stage::Integrate); ++s) {
-    sum += profile[s].first_s + profile[s].later_s + 2.0 * process_cpu_clock_cost() * static_cast<double>(profile[s].timed);
+    const StageProfile& p = profile[s];
+    sum += p.first_s + p.later_s + p.apart_s + 2.0 * process_cpu_clock_cost() * static_cast<double>(p.timed + p.apart);
   }
   return sum;
 }
@@ -81,7 +84,7 @@ StageContext Simulation::Impl::context() {
           .executor = executor,
           .profile = profile,
           .skip = options.skip,
-          .timed = timed,
+          .timing = timing,
           .delaunay = &options.delaunay,
           .interrupt = options.interrupt,
           .time = time(),
@@ -94,7 +97,9 @@ StageContext Simulation::Impl::context() {
 /// which all sleep are no calls, so that each one measured stands for those up to the next.
 void Simulation::Impl::step() {
   StageProfile& p = profile[static_cast<std::size_t>(Stage::Integrate)];
-  timed = options.profile || steps_made % kTimedEvery == 0;
+  timing = options.profile || step_was_long ? StepTiming::Apart : steps_made % kTimedEvery == 0 ? StepTiming::Sample : StepTiming::None;
+  const bool timed = timing != StepTiming::None;
+  const auto started = std::chrono::steady_clock::now();
   const std::uint64_t calls = p.calls;
   const double inside = timed ? measured_inside(profile) : 0.0, begin = timed ? process_cpu_seconds() : 0.0;
   try {
@@ -107,9 +112,10 @@ void Simulation::Impl::step() {
   ++steps_made;
   const double end = timed ? process_cpu_seconds() : 0.0;
   const double taken = timed ? end - begin - process_cpu_clock_cost() - (measured_inside(profile) - inside) : 0.0;
-  if (timed && p.calls == calls) p.apart_s += taken * static_cast<double>(options.profile ? 1 : kTimedEvery);
-  if (timed && p.calls > calls) (p.timed++ == 0 ? p.first_s : p.later_s) += taken;
-  timed = false;
+  if (timed && p.calls == calls) p.apart_s += taken * static_cast<double>(timing == StepTiming::Apart ? 1 : kTimedEvery);
+  if (timed && p.calls > calls) p.book(taken, timing == StepTiming::Apart);
+  timing = StepTiming::None;
+  step_was_long = std::chrono::steady_clock::now() - started > kLongStep;
   if (state.substep == 0) {
     const double before = process_cpu_seconds();
     book_audits();
@@ -297,7 +303,7 @@ void Simulation::Impl::evaluate_forces(const core::ParticleState& at_state, doub
   out.reset(particles.size());
   if (!options.skip || plan.on(Stage::Interact) || !added_loads.empty()) {
     StageProfile& p = profile[static_cast<std::size_t>(Stage::Interact)];
-    StageTimer timer(p, timed);
+    StageTimer timer(p, timing);
     const core::InteractionCounts counts = core::accumulate_interactions(particles, at_state, awake_laws, executor, workspace, out.internal);
     core::add_external_loads(particles, awake_laws, at, out.external);
     p.visited += counts.pairs_visited;

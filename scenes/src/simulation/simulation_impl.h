@@ -27,7 +27,8 @@ struct Simulation::Impl {
   Executor executor;
   StepPlan plan;
   Profile profile{};
-  bool timed = false;            ///< the stages of the step under way are measured
+  StepTiming timing = StepTiming::None;  ///< of the step under way
+  bool step_was_long = false;    ///< the last one
   std::uint64_t steps_made = 0;  ///< by this object
   State state;
   State last_frame;
@@ -131,7 +132,7 @@ struct Simulation::Impl {
   [[noreturn]] void throw_diverged(const core::Divergence& divergence, std::uint64_t step_number, double at) const;
   /// For evaluations that are not part of a step.
   StageContext quiet_context(Profile& unused) {
-    StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
+    StageContext quiet{model, bodies, rules, executor, unused, options.skip, StepTiming::None};
     quiet.time = time();
     return quiet;
   }

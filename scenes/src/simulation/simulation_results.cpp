@@ -53,7 +53,7 @@ void Simulation::Impl::pull_contacts() {
   if (contact_on()) {
     std::vector<implicit::SampleState> trial = state.samples;
     Profile unused{};
-    StageContext quiet{model, bodies, rules, executor, unused, options.skip, false};
+    StageContext quiet{model, bodies, rules, executor, unused, options.skip, StepTiming::None};
     quiet.sticks = &state.sticks;
     quiet.time = time();
     quiet.step = held_step();
@@ -69,7 +69,7 @@ void Simulation::Impl::pull_fields() {
   pull_contacts();
   if (pulled_fields) return;
   Profile unused{};
-  place_and_index_all({model, bodies, rules, executor, unused, options.skip, false}, state.particles, pulled);
+  place_and_index_all({model, bodies, rules, executor, unused, options.skip, StepTiming::None}, state.particles, pulled);
   pulled_fields = true;
 }
 
@@ -88,7 +88,7 @@ const Division& Simulation::Impl::pull_division() {
 const std::vector<Mesh>& Simulation::Impl::pull_meshes() {
   if (pulled_meshes) return meshes;
   pull_fields();
-  const StageTimer timer(profile[static_cast<std::size_t>(Stage::Polygonise)], true);
+  const StageTimer timer(profile[static_cast<std::size_t>(Stage::Polygonise)], StepTiming::Apart);
   pull_division();
   StageContext wanted = context();
   if (shown) wanted.shown = &shown;

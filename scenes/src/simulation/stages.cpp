@@ -196,7 +196,7 @@ namespace stages {
 
 void place_skeleton(const StageContext& context, const core::ParticleState& particles, Frame& frame) {
   StageProfile& profile = profile_of(context, Stage::PlaceSkeleton);
-  StageTimer timer(profile, context.timed);
+  StageTimer timer(profile, context.timing);
   place_contact_bodies(context, particles, frame);
   for_awake(context, [&](std::size_t i) { profile.visited += context.bodies[i].skeleton.primitive.size(); });
   profile.present += frame.primitives_present;
@@ -205,7 +205,7 @@ void place_skeleton(const StageContext& context, const core::ParticleState& part
 
 void index_field(const StageContext& context, const core::ParticleState& particles, bool all, Frame& frame) {
   StageProfile& profile = profile_of(context, Stage::IndexField);
-  StageTimer timer(profile, context.timed);
+  StageTimer timer(profile, context.timing);
   profile.present += frame.bodies_present;
   const auto index_one = [&](std::size_t i) {
     index_body(context, i, frame);
@@ -229,7 +229,7 @@ void sample_surface(const StageContext& context, std::vector<implicit::SampleSta
   frame.pairs.clear();
   if (context.skip && frame.reached.empty()) return;
   StageProfile& profile = profile_of(context, Stage::SampleSurface);
-  StageTimer timer(profile, context.timed);
+  StageTimer timer(profile, context.timing);
   const auto usable = [&](std::uint32_t i) {
     return i >= context.bodies.size() || frame.near[i] != 0 || (!context.skip && collides(context, context.bodies[i]));
   };
@@ -255,7 +255,7 @@ void find_contacts(const StageContext& context, Frame& frame) {
   frame.candidates.pair.clear();
   if (context.skip && frame.reached.empty()) return;
   StageProfile& profile = profile_of(context, Stage::FindContacts);
-  StageTimer timer(profile, context.timed);
+  StageTimer timer(profile, context.timing);
   if (!frame.pairs_present) frame.pairs_present = count_present_pairs(context);
   profile.present += *frame.pairs_present;
   profile.visited += frame.pairs.size();
@@ -266,7 +266,7 @@ void find_contacts(const StageContext& context, Frame& frame) {
 void solve_contact_surface(const StageContext& context, bool energy, Frame& frame) {
   if (context.skip && frame.candidates.pair.empty()) return clear_contact(frame);
   StageProfile& profile = profile_of(context, Stage::SolveContactSurface);
-  StageTimer timer(profile, context.timed);
+  StageTimer timer(profile, context.timing);
   collision::ContactSettings settings = context.model.contact;
   settings.energy = energy;
   collision::solve_contact_surface(frame.bodies, frame.candidates, settings, context.executor, frame.surface);
@@ -285,7 +285,7 @@ void react(const StageContext& context, Frame& frame, core::ForceSample& out) {
   clear_reactions(frame);
   if (context.skip && frame.surface.summary.empty()) return;
   StageProfile& profile = profile_of(context, Stage::React);
-  StageTimer timer(profile, context.timed);
+  StageTimer timer(profile, context.timing);
   clear_loads(context, frame);
   collision::ReactionSettings settings = model.reaction;
   settings.step = context.step;
@@ -303,7 +303,7 @@ void linearise(const StageContext& context, Frame& frame, core::ContactPoints& o
   out.clear();
   if (frame.surface.summary.empty()) return;
   StageProfile& profile = profile_of(context, Stage::React);
-  StageTimer timer(profile, context.timed);
+  StageTimer timer(profile, context.timing);
   std::vector<std::span<const std::uint32_t>> particles(frame.bodies.size());
   for (std::size_t i = 0; i < context.bodies.size(); ++i) particles[i] = context.bodies[i].particle;
   collision::linearise_contacts({frame.bodies, context.rules, frame.surface, context.model.reaction}, particles, frame.linearise, out);

@@ -40,6 +40,29 @@ TEST(StageTimes, AddUpToTheWholeWithinAQuarterWhereSomeStepsStandForAll) {
   EXPECT_GT(advance, 0.0);
 }
 
+// Few long steps, the first of which are short: none stands for another.
+TEST(StageTimes, AddUpToTheWholeOfFewLongSteps) {
+  Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 0.2 s
+frame_rate: 24
+gravity: [0, 0, -9.81]
+integrator: {method: implicit}
+objects:
+  - name: block
+    particles: {arrange: grid, columns: 6, rows: 6, layers: 6, spacing: 0.05, at: [0, 0, 0.23]}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.08}}]
+    material: {youngs_modulus: 2e4, density: 1000, damping_ratio: 0.2}
+obstacles: [{name: floor, shape: plane}]
+)", "block.yaml", "."), {});
+  const double begin = process_cpu_seconds();
+  run(simulation, simulation.scene().frame_count());
+  const double whole = process_cpu_seconds() - begin;
+  const Profile stages = simulation.profile();
+  EXPECT_LT(simulation.state().steps, 100u);
+  EXPECT_NEAR(std::accumulate(stages.begin(), stages.end(), 0.0, [](double sum, const StageProfile& s) { return sum + s.cpu_s; }) / whole, 1.0, 0.1);
+}
+
 // A hand that closes spends most of its time on samples and contacts; a stage that is not measured would leave its time to `advance`.
 TEST(StageTimes, BelongToTheStagesThatTakeThem) {
   for (const bool every_step : {true, false}) {

@@ -34,7 +34,7 @@ namespace supple::scenes {
 struct SimulationOptions {
   int threads = 1;             ///< 0: all of the machine; the result does not depend on it
   bool skip = true;            ///< false: runs every stage on everything, for the test that skipping changes no bit
-  bool profile = false;        ///< measure the time of every step, not of every 61st
+  bool profile = false;        ///< measure the time of every step, not of every 61st of those that are short
   implicit::DelaunayMesher delaunay{};  ///< for `meshing: {method: delaunay}`; empty: scenes with it are refused
   const std::atomic<int>* interrupt = nullptr;  ///< not 0: long calls throw Interrupted; see InterruptScope (core/interrupt.h)
   double memory = kDefaultMemory;  ///< limit of memory for the scene, by the counts made before it is built [byte]
@@ -45,16 +45,18 @@ struct SimulationOptions {
 /// Work of one stage so far.
 struct StageProfile {
   std::uint64_t calls = 0;     ///< of `advance`: steps
-  double cpu_s = 0.0;          ///< of this stage alone. Unless profiling, measured in the first and every 61st step (a prime, so that events
-                               ///< of period 2^k steps are sampled in proportion) and scaled by calls; where several frames are in work at
-                               ///< the same time, divided so that the stages add up to the total
+  double cpu_s = 0.0;          ///< of this stage alone. Measured in every step after one of a millisecond and more; of others in the first and every 61st (a
+                               ///< prime, so that events of period 2^k steps are sampled in proportion) and scaled by calls; where several frames are
+                               ///< in work at the same time, divided so that the stages add up to the total
   double first_s = 0.0;        ///< measured of the first call: its set-up is not scaled
-  double later_s = 0.0;        ///< measured of later calls
-  double apart_s = 0.0;        ///< of occasional work, always measured and not scaled
-  std::uint64_t timed = 0;     ///< calls that were measured
+  double later_s = 0.0;        ///< measured of later calls that stand for others
+  double apart_s = 0.0;        ///< of calls that stand for themselves, and of occasional work: not scaled
+  std::uint64_t timed = 0;     ///< calls that stand for others
+  std::uint64_t apart = 0;     ///< calls that stand for themselves
   std::uint64_t visited = 0;   ///< pairs, primitives, samples, blocks ... that were processed
   std::uint64_t present = 0;   ///< their total number
-  /// Brings `cpu_s` up to date with the others.
+  /// Adds a measured call; `scale` brings `cpu_s` up to date.
+  void book(double seconds, bool stands_for_itself);
   void scale();
 };
 using Profile = std::array<StageProfile, kStageCount>;
