@@ -101,6 +101,26 @@ ground: {friction: 0.4}
   EXPECT_EQ(choice("[0, 0, 0]"), core::Integrator::Symplectic);  // nothing moves
 }
 
+TEST(AccuracyKey, TakesImplicitStepsWhereFastVibrationsDieOut) {
+  const auto choice = [](const std::string& ratio) {
+    const Scene scene = read(R"(
+schema: 1
+duration: 1 s
+frame_rate: 24
+gravity: [0, 0, -9.81]
+objects:
+  - name: block
+    particles: {arrange: grid, columns: 5, rows: 3, layers: 3, spacing: 0.05, at: [0, 0, 0.3]}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.08}}]
+    material: {youngs_modulus: 2e4, density: 1000, damping_ratio: )" + ratio + R"(}
+obstacles: [{name: floor, shape: plane}]
+)");
+    return plan_integrator(scene, build_model(scene)).settings.method;
+  };
+  EXPECT_EQ(choice("0.2"), core::Integrator::ImplicitMidpoint);
+  EXPECT_EQ(choice("0.002"), core::Integrator::Symplectic);
+}
+
 TEST(ImplicitMethod, IsMidpointInStepsThatResolveContactAndElseBackwardEuler) {
   const auto choice = [](const std::string& keys) {
     const Scene scene = read(ball("integrator: {method: implicit}\n" + keys, 0.5));
