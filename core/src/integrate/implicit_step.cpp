@@ -191,7 +191,7 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
   constexpr int kMostHalvings = 30;
   constexpr int kMostLags = 8;           // times that friction follows the normal forces
   constexpr double kOfStickSpeed = 5e-3; // velocities at the end of a step tell what holds to a hundredth of the friction
-  constexpr double kOfFriction = 100.0;  // of the tolerance: share of it that may be left
+  constexpr double kOfFriction = 10.0;   // of the tolerance: share of it that may be left
   constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
   report.within_tolerance = false;
   double value = 0.0;

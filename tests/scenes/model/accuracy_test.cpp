@@ -110,14 +110,15 @@ frame_rate: 24
 gravity: [0, 0, -9.81]
 objects:
   - name: block
-    particles: {arrange: grid, columns: 5, rows: 3, layers: 3, spacing: 0.05, at: [0, 0, 0.3]}
+    particles: {arrange: grid, columns: 10, rows: 3, layers: 3, spacing: 0.05, at: [0, 0, 0.3]}
     skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.08}}]
     material: {youngs_modulus: 2e4, density: 1000, damping_ratio: )" + ratio + R"(}
+    contact: {friction: 0}
 obstacles: [{name: floor, shape: plane}]
 )");
     return plan_integrator(scene, build_model(scene)).settings.method;
   };
-  EXPECT_EQ(choice("0.2"), core::Integrator::ImplicitMidpoint);
+  EXPECT_EQ(choice("0.3"), core::Integrator::ImplicitMidpoint);
   EXPECT_EQ(choice("0.002"), core::Integrator::Symplectic);
 }
 
