@@ -260,14 +260,10 @@ double ContactTerm::lag_friction(const ParticleState& pose) {
   if (empty()) return 0.0;
   place(pose);
   double change = 0.0, all = 0.0;
-  most_friction_.assign(touched_.size(), 0.0);
   for (const Group& group : groups_) {
     const LagSums sums = lag_forces(lanes_, group.lanes);
     change += sums.change;
     all += sums.all;
-    for (std::uint32_t e = group.entry_begin; e < group.entry_end; ++e) {
-      most_friction_[entry_[e]] += group.lanes.friction * std::abs(points_->share[e]) * sums.all;
-    }
   }
   scale_splits();
   return all > 0.0 ? change / all : 0.0;

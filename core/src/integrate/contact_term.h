@@ -54,10 +54,9 @@ class ContactTerm {
   /// Goes this share of the way to the predicted directions.
   void turn_friction(double share);
 
-  /// Touched particles, ascending; the least speed below which friction on each fades out [m/s], and the most that friction is on each [N].
+  /// Touched particles, ascending, and the least speed below which friction on each fades out [m/s].
   [[nodiscard]] const std::vector<std::uint32_t>& touched() const { return touched_; }
   [[nodiscard]] const std::vector<double>& least_stick_speed() const { return least_stick_; }
-  [[nodiscard]] const std::vector<double>& most_friction() const { return most_friction_; }
 
   /// Adds the loads on particles at the pose; books what obstacles get and do, and what damping and friction take over `dt`.
   void finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger, std::vector<ContactPairLoad>& pairs);
@@ -95,7 +94,6 @@ class ContactTerm {
   std::vector<std::uint32_t> touched_;   // particles, ascending
   std::vector<std::uint32_t> rank_;      // index into `touched_`, by particle, where it is touched
   std::vector<double> least_stick_;      // of the pairs of each touched particle [m/s]
-  std::vector<double> most_friction_;    // lagged, on each touched particle [N]
   std::vector<std::uint32_t> entry_;     // index into `touched_`, by entry of the rows
   std::vector<Group> groups_;
   std::vector<Vec3> arm_;                // from the centres of its particles to a group's origin at the predicted pose, by entry of the group

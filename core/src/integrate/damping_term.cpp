@@ -101,20 +101,8 @@ void DampingTerm::add_gradient(const ParticleState& pose, Eigen::VectorXd& gradi
   }
 }
 
-void DampingTerm::add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian) {
-  if (empty()) return;
-  place(pose);
-  std::vector<Mat3> map(pose.size());
-  for (std::size_t i = 0; i < pose.size(); ++i) map[i] = inverse_right_jacobian(-turned_[i]);
-  for (std::size_t k = 0; k < pair_.size(); ++k) {
-    const auto [a, b] = coupled_[k];
-    PairHessian h = factor_ / h_ * pair_[k].matrix;
-    h.middleCols<3>(3) = h.middleCols<3>(3).lazyProduct(map[a]).eval();
-    h.middleCols<3>(9) = h.middleCols<3>(9).lazyProduct(map[b]).eval();
-    h.middleRows<3>(3) = map[a].transpose().lazyProduct(h.middleRows<3>(3)).eval();
-    h.middleRows<3>(9) = map[b].transpose().lazyProduct(h.middleRows<3>(9)).eval();
-    hessian.add_pair(first_pair + k, h);
-  }
+void DampingTerm::add_hessian(std::size_t first_pair, StepHessian& hessian) const {
+  for (std::size_t k = 0; k < pair_.size(); ++k) hessian.add_pair(first_pair + k, factor_ / h_ * pair_[k].matrix);
 }
 
 void DampingTerm::finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger) {

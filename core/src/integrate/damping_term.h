@@ -33,8 +33,9 @@ class DampingTerm {
   [[nodiscard]] double value(const ParticleState& pose);
   /// Adds the gradient in (displacement, rotation) of each particle, the rotation applied from the left, world axes.
   void add_gradient(const ParticleState& pose, Eigen::VectorXd& gradient);
+  /// Adds t D / h, which leaves out how rotations of one step follow each other: Newton's method needs no more.
   /// @param first_pair  index of `coupled()[0]` in the list of the matrix
-  void add_hessian(const ParticleState& pose, std::size_t first_pair, StepHessian& hessian);
+  void add_hessian(std::size_t first_pair, StepHessian& hessian) const;
   /// Adds the loads on particles at the pose, whose sums and moments vanish, and books what they take over `dt`.
   void finish(const ParticleState& pose, double dt, Loads& loads, Ledger& ledger);
 

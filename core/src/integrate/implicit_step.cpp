@@ -68,9 +68,8 @@ class StepPotential {
   }
 
   /// Whether the forces that the last `differentiate` left over change the velocity of each particle, turns at a distance of `length`, by at most
-  /// `of_stick` of the speed below which friction on it fades out, or `of_friction` of what friction at most changes it by. Particles that touch nothing
-  /// pass motion on to those that do.
-  [[nodiscard]] bool leaves_less_than(double of_stick, double of_friction, double length) const {
+  /// `of_stick` of the speed below which friction on it fades out. Particles that touch nothing pass motion on to those that do.
+  [[nodiscard]] bool leaves_less_than(double of_stick, double length) const {
     const std::vector<std::uint32_t>& touched = buffers_.contact.touched();
     const std::vector<double>& stick = buffers_.contact.least_stick_speed();
     if (touched.empty()) return true;
@@ -79,8 +78,7 @@ class StepPotential {
     for (std::size_t i = 0; i < set_.size(); ++i) {
       while (t < touched.size() && touched[t] < i) ++t;
       const bool touches = t < touched.size() && touched[t] == i;
-      const double speed = of_stick * (touches ? stick[t] : least);
-      const double most = std::max(speed / h_, touches ? of_friction * buffers_.contact.most_friction()[t] / set_.mass[i] : 0.0);
+      const double most = of_stick * (touches ? stick[t] : least) / h_;
       const auto row = static_cast<Eigen::Index>(6 * i);
       const double push2 = (1.0 / set_.mass[i] * buffers_.gradient.segment<3>(row)).squaredNorm();
       const double spin2 = (buffers_.pose.orientation[i].conjugate() * Vec3(buffers_.gradient.segment<3>(row + 3))).cwiseQuotient(set_.inertia[i]).squaredNorm();
@@ -128,7 +126,7 @@ class StepPotential {
       buffers_.hessian.add_particle(static_cast<std::uint32_t>(i), h);
     }
     for (std::size_t k = 0; k < buffers_.blocks.size(); ++k) buffers_.hessian.add_pair(k, buffers_.blocks[k]);
-    buffers_.damping.add_hessian(pose, buffers_.blocks.size(), buffers_.hessian);
+    buffers_.damping.add_hessian(buffers_.blocks.size(), buffers_.hessian);
     buffers_.contact.add_hessian(pose, buffers_.blocks.size() + damped.size(), buffers_.hessian);
   }
 
@@ -184,22 +182,22 @@ void move(const ParticleState& pose, const Eigen::VectorXd& correction, double s
 }
 
 /// Newton's method from `buffers.pose`, which ends at the minimum; `buffers.laws` are the loads there.
-void minimise(const IntegratorSettings& settings, StepPotential& potential, ImplicitBuffers& buffers, StepReport& report) {
+/// @param value  of the potential there
+void minimise(const IntegratorSettings& settings, double value, StepPotential& potential, ImplicitBuffers& buffers, StepReport& report) {
   constexpr double kDescent = 1e-4;      // Armijo's share of the descent that the gradient promises
   constexpr double kRoundOff = 1e-14;    // of the potential
   constexpr double kLargestTurn = 0.5;   // [rad] in one correction
   constexpr int kMostHalvings = 30;
   constexpr int kMostLags = 8;           // times that friction follows the normal forces
   constexpr double kOfStickSpeed = 5e-3; // velocities at the end of a step tell what holds to a hundredth of the friction
-  constexpr double kOfFriction = 10.0;   // of the tolerance: share of it that may be left
   constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
   report.within_tolerance = false;
-  double value = 0.0;
   int lags = 0;
   const auto begin_at_pose = [&] {
     if (lags < kMostLags) {
+      const double before = buffers.contact.value(buffers.pose);
       lags = buffers.contact.lag_friction(buffers.pose) > kLagged ? lags + 1 : kMostLags;
-      value = potential.value(buffers.pose);  // of the friction that follows the normal forces
+      value += buffers.contact.value(buffers.pose) - before;  // of the friction that follows the normal forces
     }
     potential.differentiate(buffers.pose);
   };
@@ -237,7 +235,7 @@ void minimise(const IntegratorSettings& settings, StepPotential& potential, Impl
     value = next;
     begin_at_pose();
     // Friction is so steep in the slip that forces, and with them velocities, may err where the pose does not.
-    if (small && (buffers.contact.empty() || potential.leaves_less_than(kOfStickSpeed, kOfFriction * settings.tolerance, settings.length) || is_rounding(buffers.correction, buffers.pose))) {
+    if (small && (buffers.contact.empty() || potential.leaves_less_than(kOfStickSpeed, settings.length) || is_rounding(buffers.correction, buffers.pose))) {
       report.within_tolerance = true;
       return;
     }
@@ -280,8 +278,8 @@ void freeze(const StepProblem& problem, double time, const ParticleState& at, co
   }
 }
 
-/// The pose of least potential of three: free flight; the start, where bonds are stiff; the start moved on by its velocities, where bodies rest on others.
-void guess(const StepProblem& problem, double time, double h, const StepPotential& potential, ImplicitBuffers& buffers) {
+/// Sets `buffers.pose` to that of least potential of three: free flight; the start, where bonds are stiff; the start moved on by its velocities, where bodies rest on others. @return its potential
+double guess(const StepProblem& problem, double time, double h, const StepPotential& potential, ImplicitBuffers& buffers) {
   buffers.pose = buffers.flight;
   double least = potential.value(buffers.flight);
   const auto offer = [&](const ParticleState& pose) {
@@ -293,12 +291,13 @@ void guess(const StepProblem& problem, double time, double h, const StepPotentia
   buffers.trial = buffers.start;
   place_led(problem, time, buffers.trial);
   offer(buffers.trial);
-  if (buffers.contact.empty()) return;
+  if (buffers.contact.empty()) return least;
   Loads none;
   none.reset(problem.set.size());
   fly(problem.set, buffers.start, none, h, buffers.trial);
   place_led(problem, time, buffers.trial);
   offer(buffers.trial);
+  return least;
 }
 
 /// Momenta after dt under the loads at `buffers.pose`; books impulses and, by the way from `start` to `state`, works.
@@ -391,9 +390,10 @@ StepReport advance_implicit(const IntegratorSettings& settings, const StepProble
   buffers.damping.clear();
 
   StepPotential potential(set, interactions, tools.executor, h, tools.pairs, buffers);
-  guess(problem, time + h, h, potential, buffers);
+  double value = guess(problem, time + h, h, potential, buffers);
   buffers.damping.begin(set, interactions, buffers.start, buffers.pose, h, midpoint);
-  minimise(settings, potential, buffers, report);
+  value += buffers.damping.value(buffers.pose);
+  minimise(settings, value, potential, buffers, report);
 
   const ParticleState& start = buffers.start;
   buffers.damping.finish(buffers.pose, dt, buffers.laws, ledger);

@@ -7,7 +7,7 @@ namespace supple::scenes {
 
 AccuracyRules accuracy_rules(double accuracy) {
   constexpr double kCoarsest = 1e-2;
-  constexpr StepBounds kExplicit{.phase = 0.3, .travel = 0.1}, kImplicit{.phase = 1.0, .travel = 0.25};  // at the coarsest accuracy
+  constexpr StepBounds kExplicit{.phase = 0.3, .travel = 0.1}, kImplicit{.phase = 0.8, .travel = 0.2};  // at the coarsest accuracy
   const double finer = std::sqrt(accuracy / kCoarsest);
   return {.contact_error = accuracy,
           .mesh_share = std::max(accuracy, 1e-4),

@@ -78,6 +78,7 @@ TEST(Obstacles, CarryFlatAndStraightBodiesAtRest) {
 schema: 1
 duration: 2 s
 frame_rate: 20
+accuracy: 5e-3
 gravity: [0, 0, -9.81]
 contact: {error: 0.01}
 objects:
