@@ -6,4 +6,4 @@ supple_together(
   "src/gl/gl_context.cpp src/image/image.cpp src/image/overlay.cpp src/gl/shader_parts.cpp"
   "src/gl/shaders_light.cpp src/gl/shaders_occlusion.cpp src/image/srgb.cpp"
   "src/path/integrator.cpp src/path/details.cpp src/path/tracer.cpp src/path/paint.cpp"
-  "src/path/geometry.cpp src/path/denoise.cpp")
+  "src/path/geometry.cpp src/path/denoise.cpp src/path/media.cpp")

@@ -13,7 +13,7 @@ mkdir -p "$work" "$pictures"
 scenes=$(cat <<'LIST'
 ball_hits_spiral|29|A ball hits a spiral that remembers its shape
 spiral_uncoils|60|The spiral is pulled open and coils up again
-two_balls|13|Two balls meet off centre; their surfaces touch without a gap
+two_balls|11|Two balls meet off centre; their surfaces touch without a gap
 ball_on_plate|20|A ball comes to rest on a plate
 ball_on_mesh|24|Balls roll off a block from a mesh file
 bounces|14|A ball bounces lower and lower
@@ -27,8 +27,10 @@ primitives|1|Skeleton shapes
 joined_segments|1|Segments with and without bulges where they join
 hand_and_mitten|1|Which parts blend is a graph
 still_life|1|Light between surfaces, by the path tracer
-strand_parts|12|Two strands before they part
-bar_with_hinge|20|A bar of two kinds of particles folds at its hinge
+glass_and_wax|1|Glass, wax and jelly, by the path tracer
+rain_of_balls|46|Balls appear one after the other and fall into a box
+strand_parts|34|A strand parts: at once, and fading
+bar_with_hinge|14|A bar of two kinds of particles folds at its hinge
 LIST
 )
 

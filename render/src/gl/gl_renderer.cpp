@@ -58,7 +58,7 @@ void GlRenderer::draw_ground_occlusion(const MapFit& fit, float ground_height) {
   programs_->ground_occlusion.use();
   programs_->ground_occlusion.set("heights", kHeights);
   programs_->ground_occlusion.set("map_size", fit.extent.x());
-  programs_->ground_occlusion.set("target_size", static_cast<float>(kGroundOcclusionSize));
+  programs_->ground_occlusion.set("target_size", static_cast<float>(ground_occlusion_.width));
   draw_cover();
 }
 
@@ -348,7 +348,7 @@ GlRenderer::Shot GlRenderer::draw(const LocalView& local, std::span<const Item> 
 
   draw_geometry(shot.camera, items);
   if (has_items) draw_screen_occlusion(shot.camera, view, shot.radius);
-  draw_picture(output_, light_programs(lighting(view, false)), shot, view);
+  draw_picture(output_, light_programs(lighting(view, items, false)), shot, view);
   gl_.Finish();
   return shot;
 }
@@ -368,7 +368,7 @@ Image GlRenderer::render(const View& view, std::span<const Item> items, LinearIm
     const CpuClock clock(times_.draw);
     gl_.ActiveTexture(GL_TEXTURE0 + kUploads);
     if (!linear_) linear_ = make_target(gl_, settings_.width, settings_.height, {.colour = GL_RGBA32F, .depth = true});
-    draw_picture(*linear_, light_programs(lighting(view, true)), shot, local.view);
+    draw_picture(*linear_, light_programs(lighting(view, items, true)), shot, local.view);
     gl_.Finish();
   }
   const CpuClock clock(times_.read_back);

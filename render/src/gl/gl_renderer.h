@@ -23,7 +23,7 @@ enum Unit : int {
   kPaints, kPicture, kColourMaps, kAreaDepth, kAreaCompare, kGroundPicture, kUploads
 };
 inline constexpr int kHeightMapSize = 256;
-inline constexpr int kGroundOcclusionSize = 96;
+inline constexpr int kGroundOcclusionSize = 96, kSmallGroundOcclusionSize = 48;  // with shadow maps of small pictures
 // Materials lie in double rows of this many items; the shader uses the constants 4095 and 12.
 inline constexpr std::size_t kMaterialRow = 4096;
 inline constexpr std::size_t kAreaLights = 4;
@@ -66,7 +66,7 @@ class GlRenderer final : public Renderer {
   void upload(const View& view, std::span<const Item> items);
   void upload_materials(std::span<const Item> items);
   void upload_pictures(const View& view, std::span<const Item> items);
-  [[nodiscard]] shaders::Lighting lighting(const View& view, bool scene_linear) const;
+  [[nodiscard]] shaders::Lighting lighting(const View& view, std::span<const Item> items, bool scene_linear) const;
   [[nodiscard]] const LightPrograms& light_programs(const shaders::Lighting& lighting);
   void draw_range(const DrawRange& range) const;
   void draw_all_items() const;

@@ -18,11 +18,12 @@ GlRenderer::LightPrograms::LightPrograms(const Gl& gl, const shaders::Lighting& 
       ground(gl, shaders::whole_picture(), shaders::lit_ground(lighting)),
       items(gl, shaders::whole_picture(), shaders::lit_items(lighting)) {}
 
-shaders::Lighting GlRenderer::lighting(const View& view, bool scene_linear) const {
+shaders::Lighting GlRenderer::lighting(const View& view, std::span<const Item> items, bool scene_linear) const {
   return {.samples = samples_,
           .painted = painted_,
           .area_lights = !view.area_lights.empty(),
           .ground_paint = view.ground && view.ground->paint.kind != PaintKind::Plain,
+          .inside = std::any_of(items.begin(), items.end(), [](const Item& item) { return item.inside.kind != InsideKind::Opaque; }),
           .scene_linear = scene_linear};
 }
 
@@ -76,8 +77,10 @@ void GlRenderer::make_targets() {
   const int half_height = (height + 1) / 2;
   const int shadow_size = std::max(1, settings_.shadow_size);
   shadow_ = make_target(gl_, shadow_size, shadow_size, {.colour = 0, .depth = true});
-  ground_occlusion_ =
-      make_target(gl_, kGroundOcclusionSize, kGroundOcclusionSize, {.colour = GL_R32F, .filter = GL_LINEAR});
+  constexpr int kSmallShadowMap = 512;
+  const bool small = settings_.shadow_size > 0 && settings_.shadow_size <= kSmallShadowMap;
+  const int occlusion_size = small ? kSmallGroundOcclusionSize : kGroundOcclusionSize;
+  ground_occlusion_ = make_target(gl_, occlusion_size, occlusion_size, {.colour = GL_R32F, .filter = GL_LINEAR});
   geometry_ = make_target(gl_, width, height, {.colour = GL_RG32UI, .depth = true, .samples = samples_});
   occlusion_ = make_target(gl_, half_width, half_height, {.colour = GL_RG32F});
   blurred_ = make_target(gl_, half_width, half_height, {.colour = GL_RG32F});
@@ -153,18 +156,46 @@ void GlRenderer::upload(const View& view, std::span<const Item> items) {
                  GL_STREAM_DRAW);
 }
 
+namespace {
+
+double least_extent(const Item& item) {
+  Box box;
+  for (const Vec3& p : item.mesh->position) box.include(p);
+  return box.empty() ? 0.0 : box.extent().minCoeff();
+}
+
+/// For the shaders: -index of glass; above 0, mean free path over half the least extent of what scatters.
+float inside_number(const Item& item) {
+  constexpr double kMost = 4.0;
+  if (item.inside.kind == InsideKind::Opaque) return 0.0F;
+  if (item.inside.kind == InsideKind::Glass) return static_cast<float>(-item.inside.index);
+  const double half = 0.5 * least_extent(item);
+  return static_cast<float>(half > 0.0 ? std::min(item.inside.depth / half, kMost) : kMost);
+}
+
+/// Its colour, or what glass lets through along its least extent.
+Eigen::Vector3f shown_colour(const Item& item) {
+  const Eigen::Vector3f colour = linear_colour(item.colour);
+  if (item.inside.kind != InsideKind::Glass) return colour;
+  if (!(item.inside.depth > 0.0)) return Eigen::Vector3f::Ones();
+  return colour.cwiseMax(1e-3F).array().pow(static_cast<float>(least_extent(item) / item.inside.depth)).matrix();
+}
+
+}  // namespace
+
 void GlRenderer::upload_materials(std::span<const Item> items) {
   const std::size_t columns = std::min(items.size(), kMaterialRow);
   const std::size_t rows = 2 * ((items.size() + columns - 1) / columns);
   material_values_.assign(4 * columns * rows, 0.0F);
   for (std::size_t i = 0; i < items.size(); ++i) {
     float* out = &material_values_[4 * (i % kMaterialRow + 2 * columns * (i / kMaterialRow))];
-    const Eigen::Vector3f albedo = linear_colour(items[i].colour);
+    const Eigen::Vector3f albedo = shown_colour(items[i]);
     for (int k = 0; k < 3; ++k) out[k] = albedo[k];
     out[3] = static_cast<float>(std::clamp(items[i].roughness, 0.02, 1.0));
     out[4 * columns] = static_cast<float>(std::clamp(items[i].metallic, 0.0, 1.0));
     out[4 * columns + 1] = is_painted(items[i]) ? 1.0F : 0.0F;
     out[4 * columns + 2] = static_cast<float>(std::clamp(items[i].reflectance, 0.0, 1.0));
+    out[4 * columns + 3] = inside_number(items[i]);
   }
   gl_.ActiveTexture(GL_TEXTURE0 + kMaterials);
   gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, static_cast<GLsizei>(columns), static_cast<GLsizei>(rows), 0, GL_RGBA,

@@ -15,6 +15,7 @@ struct Lighting {
   bool painted = false;       ///< albedos of the geometry buffer where a material requires it
   bool area_lights = false;
   bool ground_paint = false;
+  bool inside = false;        ///< light goes into some of the items
   bool scene_linear = false;  ///< radiance times cover, and cover, instead of the display's colours
   auto operator<=>(const Lighting&) const = default;
 };

@@ -314,7 +314,7 @@ vec4 ground_light(vec3 p, vec3 behind, float visible) {
 )";
 
 const char* const kItemLight = R"(
-uniform sampler2D materials;      // albedo and roughness of each item; in the next row, metallic, painted, reflectance
+uniform sampler2D materials;      // albedo and roughness of each item; in the next row, metallic, painted, reflectance, inside
 uniform sampler2D occlusion;
 uniform float occlusion_radius;
 uniform int contact_taps;         // 0: no other item to touch
@@ -337,32 +337,71 @@ float item_visibility(float depth) {
   return sum / weight_sum;
 }
 
-// A dark hair line where another item meets this one in the picture and in depth.
-float contact_line(uint id, float depth) {
+// A dark hair line where another item meets this one in the picture and in depth, unless their faces are flush.
+float contact_line(uint id, float depth, vec3 n) {
   ivec2 last = ivec2(picture_size) - 1;
   float near_by = 6.0 * depth * 2.0 * half_extent.y / picture_size.y;
   float touching = 0.0;
   vec2 turned = vec2(1.25, 0.0);
   for (int i = 0; i < contact_taps; ++i) {
     ivec2 there = clamp(ivec2(gl_FragCoord.xy + turned), ivec2(0), last);
-    uint other = GEOMETRY(there, 0).g;
+    uvec2 geometry_there = GEOMETRY(there, 0).rg;
+    uint other = geometry_there.g;
+    float bent = min(8.0 * (1.0 - dot(unpack_normal(geometry_there.r), n)), 1.0);
     float gap = abs(eye_depth(DEPTH(there, 0).r) - depth);
-    touching += other != id ? max(1.0 - gap / near_by, 0.0) : 0.0;
+    touching += other != id ? bent * max(1.0 - gap / near_by, 0.0) : 0.0;
     turned = mat2(0.70710678, 0.70710678, -0.70710678, 0.70710678) * turned;
   }
   return 1.0 - 0.6 * min(touching * 0.5, 1.0);
 }
 
+#ifdef INSIDE
+// Light from the sun that scatters inside: it bends around the body, the farther the longer its free path (`soft`, over half the
+// body's extent), and comes through where the sun is behind. Over all directions of the normal the mean is that of n.l.
+vec3 scattered(vec3 albedo, float soft, float cosine, float behind) {
+  vec3 wrap = min(vec3(soft) * (0.5 + albedo), 1.0);
+  vec3 around = max((vec3(cosine) + wrap) / ((1.0 + wrap) * (1.0 + wrap)), 0.0);
+  return around + wrap * albedo * (0.25 * pow(max(behind, 0.0), 4.0));
+}
+
+// What a ray brings that goes through a ball of glass: its second refraction is that of the first one mirrored. Beyond are sky, floor
+// and the light that the ball gathers from the sun.
+vec3 through_glass(vec3 n, vec3 v, float index, vec3 tint) {
+  vec3 within = refract(-v, n, 1.0 / index);
+  vec3 m = normalize(n - 2.0 * dot(n, within) * within);   // where the chord leaves the ball
+  vec3 out_of = refract(within, -m, index);
+  vec3 d = dot(out_of, out_of) > 0.0 ? out_of : reflect(within, m);
+  float blur = 0.03;
+  vec3 floor_light = max(ground_albedo * (sky + sun * max(to_light.z, 0.0)), bounce);
+  vec3 beyond = mix(floor_light, sky, smoothstep(-blur, blur, d.z));
+  float focus = smoothstep(0.90, 0.995, dot(d, to_light));
+  float way = abs(dot(n, within));                         // over the ball's diameter
+  return (beyond + sun * (0.6 * focus)) * pow(max(tint, 0.001), vec3(way));
+}
+#endif
+
 vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_albedo) {
   int number = int(id) - 1;
   ivec2 row = ivec2(number & 4095, (number >> 12) * 2);
   vec4 material = texelFetch(materials, row, 0);
-  vec3 more = texelFetch(materials, row + ivec2(0, 1), 0).rgb;
+  vec4 more = texelFetch(materials, row + ivec2(0, 1), 0);
   vec3 base = more.y > 0.5 ? own_albedo : material.rgb;
   vec3 albedo = base * (1.0 - more.x);
   vec3 normal_reflectance = mix(vec3(more.z), base, more.x);
   float roughness = material.a;
   vec3 v = normalize(eye - p);
+#ifdef INSIDE
+  float soft = max(more.w, 0.0);
+  bool is_glass = more.w < 0.0;
+  vec3 inner = albedo;
+  if (soft > 0.0) albedo = vec3(0.0);
+  if (is_glass) {
+    float f = (-more.w - 1.0) / (1.0 - more.w);
+    normal_reflectance = vec3(f * f);
+    albedo = vec3(0.0);
+    roughness = 0.05;
+  }
+#endif
   vec3 h = normalize(v + to_light);
   float nv = max(dot(n, v), 0.08);   // interpolated normals may look away at an outline
   float nl = max(dot(n, to_light), 0.0);
@@ -376,6 +415,16 @@ vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_al
   float d = a2 / (spread * spread);
   float smith = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2));
   vec3 radiance = sun * (nl * visible) * (albedo * base_of(normal_reflectance, nv, nl) + d * smith * fresnel_of(normal_reflectance, vh));
+
+#ifdef INSIDE
+  if (soft > 0.0) {
+    float cosine = dot(n, to_light);
+    // Shadows bleed in, too, and the own shadow of the body is that of the wrapped cosine.
+    float lit = mix(visible, 1.0, cosine < 0.0 ? 0.7 : 0.25 * min(soft, 1.0));
+    radiance += sun * lit * inner * scattered(inner, soft, cosine, -dot(v, to_light)) * base_of(normal_reflectance, nv);
+    albedo = inner;
+  }
+#endif
 
   // Occlusion with the light that an occluder of the same colour sends back (Jimenez et al. 2016).
   float ao = item_visibility(depth);
@@ -393,6 +442,12 @@ vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_al
   vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
   float split = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
   vec3 gloss = normal_reflectance * (-1.04 * split + r.z) + grazing_of(normal_reflectance) * (1.04 * split + r.w);
+#ifdef INSIDE
+  if (is_glass) {
+    vec3 passed = 1.0 - fresnel_of(normal_reflectance, nv);
+    return shown(radiance + seen * gloss + passed * through_glass(n, v, -more.w, inner), 1.0, vec3(0.0));
+  }
+#endif
   radiance += seen * gloss * ao;
 #ifdef AREA_LIGHTS
   radiance += area_light(p, n, v, albedo, normal_reflectance, a2);
@@ -401,13 +456,13 @@ vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_al
   // A rim of light from behind parts the item from a ground of the same brightness.
   float edge = pow(1.0 - nv, 4.0);
   radiance += sky * (0.22 * edge * ao) * (0.4 + 0.6 * albedo) * smoothstep(-0.4, 0.8, n.z);
-  return shown(radiance, 1.0, vec3(0.0)) * vec4(vec3(contact_line(id, depth)), 1.0);
+  return shown(radiance, 1.0, vec3(0.0)) * vec4(vec3(contact_line(id, depth, n)), 1.0);
 }
 )";
 
 std::string choices(const Lighting& lighting) {
   return std::string(lighting.area_lights ? "#define AREA_LIGHTS\n" : "") + (lighting.ground_paint ? "#define GROUND_PAINT\n" : "") +
-         (lighting.scene_linear ? "#define SCENE_LINEAR\n" : "");
+         (lighting.inside ? "#define INSIDE\n" : "") + (lighting.scene_linear ? "#define SCENE_LINEAR\n" : "");
 }
 
 /// What falls on ground and items beside sun and sky, and the ground's own colour.

@@ -14,6 +14,7 @@ struct BsdfOf {
   Vector normal_reflectance = Vector::Constant(constant<Number>(0.04F));
   Number grazing_reflectance = constant<Number>(1.0F);        ///< 0: no lobe
   Number alpha = constant<Number>(0.2F);                      ///< width of the lobe, roughness squared
+  Number local = constant<Number>(1.0F);                      ///< 1: the base sends light back where it comes in; 0: elsewhere
 
   [[nodiscard]] auto has_lobe() const { return grazing_reflectance > 0.0F; }
 
@@ -30,6 +31,12 @@ struct BsdfOf {
     return select(has_lobe(), Vector(of_base + fresnel(c)), Vector(diffuse));
   }
 
+  /// Of even light from all around, what the lobe leaves to a white base that sends it that way.
+  [[nodiscard]] Vector passed(Number cosine) const {
+    const Vector below = Vector::Ones() - normal_reflectance;
+    return select(has_lobe(), Vector(below * (1.0F - grazing_reflectance * fall(larger(cosine, 0.0F)))), Vector(Vector::Ones()));
+  }
+
   /// Chance of taking the lobe instead of the base.
   [[nodiscard]] Number lobe_share(const Vector& out) const {
     const Number lobe = luminance(fresnel(out.z()));
@@ -40,7 +47,7 @@ struct BsdfOf {
 
   /// f times the cosine of `in`.
   [[nodiscard]] Vector evaluate(const Vector& out, const Vector& in) const {
-    Vector f = base(out.z(), in.z());
+    Vector f = base(out.z(), in.z()) * local;
     if (any(has_lobe())) {
       const Vector h = (out + in).normalized();
       const Number lobe = distribution(h) * masking(out, in) / (4.0F * out.z() * in.z());
@@ -51,7 +58,7 @@ struct BsdfOf {
 
   [[nodiscard]] Number density(const Vector& out, const Vector& in) const {
     const Number share = lobe_share(out);
-    Number density = (1.0F - share) * in.z() * (1.0F / kPi);
+    Number density = (1.0F - share) * local * in.z() * (1.0F / kPi);
     if (any(has_lobe())) {
       const Vector h = (out + in).normalized();
       const Number lobe = share * distribution(h) / ((1.0F + lambda(out)) * 4.0F * out.z());
@@ -112,5 +119,20 @@ struct BsdfOf {
 };
 /// Of one surface.
 using Bsdf = BsdfOf<float>;
+
+/// Refraction at a smooth surface (Snell), and what it reflects of unpolarised light (Fresnel).
+template <class Number>
+struct RefractionOf {
+  Number reflected;  ///< share; 1: all of it
+  Number cosine;     ///< of the angle between the normal and light that passes
+  /// @param cosine_in  of the angle of incidence, in [0, 1]  @param ratio  index on this side over that beyond
+  RefractionOf(Number cosine_in, Number ratio) {
+    const Number c = clamped(cosine_in, 0.0F, 1.0F);
+    const Number k = 1.0F - ratio * ratio * (1.0F - c * c);
+    cosine = root(larger(k, 0.0F));
+    const Number across = (ratio * c - cosine) / (ratio * c + cosine), along = (c - ratio * cosine) / (c + ratio * cosine);
+    reflected = select(k > 0.0F, smaller(0.5F * (across * across + along * along), 1.0F), constant<Number>(1.0F));
+  }
+};
 
 }  // namespace supple::render::path

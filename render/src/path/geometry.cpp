@@ -1,6 +1,8 @@
 #include "path/geometry.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <new>
@@ -66,6 +68,14 @@ std::vector<Quadrangle> joined(const std::vector<std::array<std::uint32_t, 3>>& 
   return out;
 }
 
+Medium medium_of(const Item& item, double per_metre) {
+  constexpr float kLeast = 1e-3F;  // of a colour, so that what is absorbed is finite
+  const auto depth = static_cast<float>(per_metre * item.inside.depth);
+  Medium medium{.kind = item.inside.kind, .index = static_cast<float>(item.inside.index), .mean_free_path = depth};
+  if (depth > 0.0F) medium.absorption = -linear_colour(item.colour).cwiseMax(kLeast).array().log().matrix() / depth;
+  return medium;
+}
+
 /// How far corners of quadrangles that follow each other lie from their middles, over how far all do: squares, which turning, moving
 /// and scaling leave as they are.
 float spread_of(const std::vector<Quadrangle>& quadrangles, const std::vector<float>& position) {
@@ -102,6 +112,7 @@ struct Geometry::Part {
   RTCGeometry geometry = nullptr;
   unsigned id = RTC_INVALID_GEOMETRY_ID;
   bool moving = false;
+  unsigned mask = 0;                 ///< of the rays that meet it: 1, and 2 those of shadows
   std::vector<float> position;       ///< at the beginning, and for moving ones at the end; [vertices][4]
   std::vector<float> position_end;
   std::vector<Vec3f> normal;
@@ -140,6 +151,11 @@ void Geometry::set(std::span<const Item> items, const PictureSpace& space, doubl
   }
   parts_.resize(items.size());
   items_.assign(items.begin(), items.end());
+  media_.clear();
+  for (const Item& item : items) media_.push_back(medium_of(item, space.per_metre));
+  const auto any_is = [&](auto&& test) { return std::any_of(items.begin(), items.end(), [&](const Item& item) { return test(item.inside.kind); }); };
+  has_media_ = any_is([](InsideKind kind) { return kind != InsideKind::Opaque; });
+  has_glass_ = any_is([](InsideKind kind) { return kind == InsideKind::Glass; });
   for (std::size_t i = 0; i < items.size(); ++i) {
     SUPPLE_EXPECTS(items[i].mesh != nullptr);
     const Mesh& mesh = *items[i].mesh;
@@ -166,7 +182,9 @@ void Geometry::set(std::span<const Item> items, const PictureSpace& space, doubl
     for (std::size_t v = 0; v < n; ++v) part.normal[v] = mesh.normal[v].cast<float>();
 
     std::vector<Quadrangle> quadrangle = joined(mesh.triangle);
-    const bool same_triangles = part.geometry != nullptr && moving == part.moving && part.position.size() == begin.size() &&
+    // Wires alone throw no shadow, and glass lets light pass.
+    const unsigned mask = items[i].surface && items[i].inside.kind != InsideKind::Glass ? 3u : 1u;
+    const bool same_triangles = part.geometry != nullptr && mask == part.mask && moving == part.moving && part.position.size() == begin.size() &&
                                 quadrangle == part.quadrangle;
     if (same_triangles && same_place && begin == part.position && end == part.position_end) {
       ++counts_.kept;
@@ -221,8 +239,8 @@ void Geometry::set(std::span<const Item> items, const PictureSpace& space, doubl
     if (moving) fill(1, part.position_end);
     void* to = given(device_, rtcSetNewGeometryBuffer(part.geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, sizeof(Quadrangle), part.quadrangle.size()));
     std::memcpy(to, part.quadrangle.data(), part.quadrangle.size() * sizeof(Quadrangle));
-    // Wires alone throw no shadow.
-    rtcSetGeometryMask(part.geometry, items[i].surface ? 3u : 1u);
+    rtcSetGeometryMask(part.geometry, mask);
+    part.mask = mask;
     rtcCommitGeometry(part.geometry);
     part.id = static_cast<unsigned>(i);
     rtcAttachGeometryByID(scene_, part.geometry, part.id);
@@ -324,24 +342,63 @@ void Geometry::move_to_vertex(const Vec3f& from, const Vec3f& direction, float t
   back = (b - a).cross(c - a).dot(direction) > 0.0F;
 }
 
-Geometry::Crossing Geometry::crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const {
+namespace {
+
+/// The least distance that is surely past another.
+float beyond(float distance) { return distance * (1.0F + 2e-6F) + std::numeric_limits<float>::min(); }
+
+}  // namespace
+
+Geometry::Crossing Geometry::crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end, float far_end) const {
   Query query(*this, RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   RTCRayHit ray{};
   ray.ray = {.org_x = from.x(), .org_y = from.y(), .org_z = from.z(), .tnear = near_end,
              .dir_x = direction.x(), .dir_y = direction.y(), .dir_z = direction.z(), .time = time,
-             .tfar = std::numeric_limits<float>::infinity(), .mask = 1u, .id = 0, .flags = 0};
+             .tfar = far_end, .mask = 1u, .id = 0, .flags = 0};
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene_, &query.context, &ray);
   return query.first[0];
 }
 
 bool Geometry::meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const {
-  return first_visible(crossed(from, direction, time, 0.0F), {from, direction, time, choice, exact}, hit);
+  return first_visible(crossed(from, direction, time, 0.0F), {from, direction, time, choice, exact, 0}, hit);
+}
+
+bool Geometry::leave(std::uint32_t item, const Vec3f& from, const Vec3f& direction, float time, float reach, Hit& hit) const {
+  Crossing crossing = crossed(from, direction, time, 0.0F, reach);
+  const Ray ray{from, direction, time, 0.0F, false, item + 1};
+  while (first_visible(crossing, ray, hit)) {
+    if (hit.distance >= reach) return false;
+    if (hit.item == item && hit.back) return true;
+    crossing = crossed(from, direction, time, beyond(hit.distance), reach);
+  }
+  return false;
+}
+
+Vec3f Geometry::passed_by_glass(const Vec3f& from, const Vec3f& direction, float time, float distance) const {
+  Vec3f absorbed = Vec3f::Zero();
+  float share = 1.0F;
+  for (float at = 0.0F; at < distance;) {
+    const Crossing crossing = crossed(from, direction, time, at, distance);
+    if (crossing.item == RTC_INVALID_GEOMETRY_ID || crossing.distance > distance) break;
+    const Medium& medium = media_[crossing.item];
+    at = beyond(crossing.distance);
+    if (medium.kind != InsideKind::Glass) continue;
+    const Part& part = *parts_[crossing.item];
+    const Quadrangle& corner = part.quadrangle[crossing.quadrangle];
+    const auto place = [&](std::uint32_t vertex) { return vector(&part.position[4 * std::size_t{vertex}]); };
+    const Vec3f normal = (place(corner[1]) - place(corner[0])).cross(place(corner[3]) - place(corner[0])).stableNormalized();
+    const float cosine = normal.dot(direction);
+    share *= 1.0F - RefractionOf<float>(std::abs(cosine), 1.0F / medium.index).reflected;
+    // From where a ray leaves, on all of its way; from where it enters, not before it.
+    absorbed += medium.absorption * (cosine > 0.0F ? crossing.distance : -crossing.distance);
+  }
+  return share * (-absorbed.cwiseMax(0.0F)).array().exp().matrix();
 }
 
 /// Of what a ray crosses from this crossing on.
 bool Geometry::first_visible(Crossing crossing, const Ray& ray, Hit& hit) const {
-  const auto& [from, direction, time, choice, exact] = ray;
+  const auto& [from, direction, time, choice, exact, inside] = ray;
   for (int layer = 0; layer < 32 && crossing.item != RTC_INVALID_GEOMETRY_ID; ++layer) {
     const Part& part = *parts_[crossing.item];
     const Item& item = items_[crossing.item];
@@ -364,24 +421,28 @@ bool Geometry::first_visible(Crossing crossing, const Ray& ray, Hit& hit) const 
     const float twice_area = std::max(cross.norm(), 1e-30F);
     hit.face_normal = cross / twice_area;
 
-    // Behind a back face of a closed body, through the holes of a wireframe, past part of what is not opaque.
+    // Behind a back face of a closed body, or a front face from its inside, through the holes of a wireframe, past part of what is not opaque.
     float edge = INFINITY;
     for (std::size_t k = 0; item.wireframe && k < 3; ++k)
       edge = std::min(edge, weight[static_cast<Eigen::Index>(k)] * twice_area / (p[(k + 2) % 3] - p[(k + 1) % 3]).norm());
     const bool on_wire = item.wireframe && edge < wire_ * hit.distance;
     const bool back = hit.face_normal.dot(direction) > 0.0F;
-    const bool visible = on_wire || (item.surface && (!back || item.two_sided) && choice < item.opacity);
+    const bool from_inside = inside == crossing.item + 1;
+    const bool visible = on_wire || (item.surface && (back == from_inside || item.two_sided) && choice < item.opacity);
     if (!visible) {
-      crossing = crossed(from, direction, time, hit.distance * (1.0F + 2e-6F) + std::numeric_limits<float>::min());
+      crossing = crossed(from, direction, time, beyond(hit.distance));
       continue;
     }
     hit.normal = (weight[0] * part.normal[corner[0]] + weight[1] * part.normal[corner[1]] + weight[2] * part.normal[corner[2]]).normalized();
+    hit.back = back;
+    hit.wire = on_wire;
     if (back) {
       hit.face_normal = -hit.face_normal;
       hit.normal = -hit.normal;
     }
     // Each tangent plane at a corner pulls the point out to itself.
     hit.leave = Vec3f::Zero();
+    hit.pass = hit.point;
     for (Eigen::Index k = 0; k < 3; ++k) {
       const Vec3f n = back ? Vec3f(-part.normal[corner[k]]) : part.normal[corner[k]];
       hit.leave += weight[k] * (hit.point - std::min(0.0F, (hit.point - p[static_cast<std::size_t>(k)]).dot(n)) * n);
@@ -391,6 +452,7 @@ bool Geometry::first_visible(Crossing crossing, const Ray& ray, Hit& hit) const 
     float largest = 0.0F;
     for (const Vec3f& at : p) largest = std::max(largest, at.cwiseAbs().maxCoeff());
     hit.leave += clearance(largest) * hit.face_normal;
+    hit.pass -= clearance(largest) * hit.face_normal;
     // A smooth normal may look away where the triangle does not.
     if (hit.normal.dot(direction) > -0.02F) hit.normal = (hit.normal - (hit.normal.dot(direction) + 0.02F) * direction).normalized();
     return true;
@@ -398,11 +460,12 @@ bool Geometry::first_visible(Crossing crossing, const Ray& ray, Hit& hit) const 
   return false;
 }
 
-/// Newton's method along the ray. A hit that would leave the neighbourhood of its triangle stays: at outlines the surface
+/// Newton's method along the ray, into the body or out of it. A hit that would leave the neighbourhood of its triangle stays: at outlines the surface
 /// may curve away from the ray.
 void Geometry::refine(const Item& item, const Vec3f& direction, Hit& hit) const {
   const Vec3 along = direction.cast<double>();
   const Vec3 start = space_.world(hit.point.cast<double>());
+  const double inward = hit.back ? -1.0 : 1.0;
   double t = 0.0;
   Vec3 gradient = Vec3::Zero();
   bool found = false;
@@ -413,13 +476,13 @@ void Geometry::refine(const Item& item, const Vec3f& direction, Hit& hit) const 
     const double slope = gradient.dot(along);
     const double size = gradient.norm();
     if (!(size > 0.0)) return;
-    if (!(slope > 0.05 * size)) break;  // grazing: the normal is good, the root may be far
+    if (!(inward * slope > 0.05 * size)) break;  // grazing: the normal is good, the root may be far
     const double move = -value / slope;
     t += move;
     if (std::abs(t) > item.field_reach) return;
     found = std::abs(move) < 1e-4 * item.field_reach;
   }
-  const Vec3f normal = -gradient.normalized().cast<float>();
+  const Vec3f normal = (-inward * gradient.normalized()).cast<float>();
   if (normal.dot(hit.face_normal) < 0.3F) return;
   hit.normal = normal;
   if (!found) return;
@@ -427,7 +490,7 @@ void Geometry::refine(const Item& item, const Vec3f& direction, Hit& hit) const 
   hit.distance += static_cast<float>(space_.per_metre * t);
   // Outside of triangle and surface both, so that neither shadows the other.
   const float outward = (p - hit.point).dot(hit.face_normal);
-  if (outward > 0.0F) hit.leave = p;
+  (outward > 0.0F ? hit.leave : hit.pass) = p;
   hit.point = p;
 }
 
@@ -504,7 +567,7 @@ LaneMask Geometry::meet(const RayBundle& rays, Lanes choice, bool exact, std::ar
   LaneMask met{};
   for (std::size_t k = 0; k < kLanes; ++k) {
     if (rays.who[k] == 0 || crossings[k].item == RTC_INVALID_GEOMETRY_ID) continue;
-    if (first_visible(crossings[k], {rays.from.lane(k), rays.direction.lane(k), rays.time[k], choice[k], exact}, hits[k])) met[k] = -1;
+    if (first_visible(crossings[k], {rays.from.lane(k), rays.direction.lane(k), rays.time[k], choice[k], exact, rays.inside[k]}, hits[k])) met[k] = -1;
   }
   return met;
 }

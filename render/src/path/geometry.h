@@ -22,6 +22,9 @@ struct Hit {
   Vec3f face_normal;  ///< unit, of the triangle, towards the ray
   Vec3f normal;       ///< unit, smooth, of the field where the item has one
   Vec3f leave;        ///< where paths go on: outside of the smooth surface (Hanika 2021) and clear of the triangle's rounding
+  Vec3f pass;         ///< where those go on that pass through the surface
+  bool back;          ///< met from inside of its body
+  bool wire;          ///< of an edge of a wireframe
   Bsdf bsdf;
   std::uint32_t item;
 };
@@ -31,7 +34,16 @@ struct RayBundle {
   Vec3Lanes from, direction;
   Lanes time;
   LaneMask who;           ///< lanes that hold a ray
+  LaneBits inside{};      ///< 1 + the item that a ray is inside of, whose back faces it meets; 0: none
   bool together = false;  ///< they start near each other and go the same way
+};
+
+/// What light does inside an item, in lengths of the picture.
+struct Medium {
+  InsideKind kind = InsideKind::Opaque;
+  float index = 1.5F;             ///< Glass
+  float mean_free_path = 1.0F;    ///< Scatter
+  Vec3f absorption = Vec3f::Zero();  ///< Glass: per length
 };
 
 /// How far from a face rays leave it, so that its own rounding does not stop them: a point of it is as far off as a few roundings of the
@@ -59,6 +71,14 @@ class Geometry {
   /// @param choice  uniform, decides about opacity
   /// @param exact   move the hit onto the field's surface
   [[nodiscard]] bool meet(const Vec3f& from, const Vec3f& direction, float time, float choice, bool exact, Hit& hit) const;
+  /// Where a ray inside an item leaves it. @param reach  no farther than this
+  [[nodiscard]] bool leave(std::uint32_t item, const Vec3f& from, const Vec3f& direction, float time, float reach, Hit& hit) const;
+  /// Share of light that glass lets pass straight on: refraction is left out, and with it caustics.
+  [[nodiscard]] Vec3f passed_by_glass(const Vec3f& from, const Vec3f& direction, float time, float distance) const;
+  [[nodiscard]] const Medium& medium(std::uint32_t item) const { return media_[item]; }
+  /// Whether light goes into some of the items.
+  [[nodiscard]] bool has_media() const { return has_media_; }
+  [[nodiscard]] bool has_glass() const { return has_glass_; }
   [[nodiscard]] bool blocked(const Vec3f& from, const Vec3f& direction, float distance, float time) const;
   /// The same for every ray of a bundle; the distance to a light is infinite.
   [[nodiscard]] LaneMask meet(const RayBundle& rays, Lanes choice, bool exact, std::array<Hit, kLanes>& hits) const;
@@ -78,12 +98,13 @@ class Geometry {
   struct Query;
   [[nodiscard]] LaneMask cross_bounds(const RayBundle& rays) const;
   [[nodiscard]] std::array<Crossing, kLanes> crossed(const RayBundle& rays) const;
-  [[nodiscard]] Crossing crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end) const;
+  [[nodiscard]] Crossing crossed(const Vec3f& from, const Vec3f& direction, float time, float near_end, float far_end = INFINITY) const;
   void move_to_vertex(const Vec3f& from, const Vec3f& direction, float time, Crossing& crossing, bool& back) const;
   struct Ray {
     Vec3f from, direction;
     float time, choice;
     bool exact;
+    std::uint32_t inside;  ///< 1 + the item it is inside of
   };
   [[nodiscard]] bool first_visible(Crossing crossing, const Ray& ray, Hit& hit) const;
   void refine(const Item& item, const Vec3f& direction, Hit& hit) const;
@@ -92,6 +113,8 @@ class Geometry {
   RTCScene scene_ = nullptr;
   std::vector<std::unique_ptr<Part>> parts_;  ///< of each item
   std::vector<Item> items_;
+  std::vector<Medium> media_;  ///< of each item
+  bool has_media_ = false, has_glass_ = false;
   PictureSpace space_;
   Vec3f lower_ = Vec3f::Zero(), upper_ = Vec3f::Zero();  ///< of the box of all items
   Vec3f centre_ = Vec3f::Zero();  ///< of the ball of all items

@@ -10,6 +10,7 @@ namespace {
 
 constexpr int kTile = 8;
 constexpr std::uint32_t kRaysAPath = 2;    // camera rays of a pixel of which one goes on beyond its first surface
+constexpr float kMirrorErrors = 8.0F;  // more, of squared errors that show as blotches
 constexpr std::uint32_t kDetailStream = 0xfffffff0u;  // those of tiles begin at 0
 
 /// Sums over a part of the light of a pixel, or of eight.
@@ -100,7 +101,7 @@ class Tile {
   explicit Tile(const Window& window) : window_(window) {}
   [[nodiscard]] Row& operator[](int y) { return rows_[static_cast<std::size_t>(y - window_.top)]; }
 
-  /// @return mean over all pixels of their squared standard error over (luminance + 0.1) squared
+  /// @return mean over all pixels of their squared standard error over (luminance + 0.1) squared, in mirrors as many times as much
   float estimate_errors() {
     // One path per pixel says nothing about its noise, which is at most the difference between pixels; a few say little where light
     // is even except for rare dark paths: they count as if one of them were such a path.
@@ -121,7 +122,9 @@ class Tile {
       row.indirect_variance = select(shown, (own * (several - 1.0F) + between / several) / several, 0.0F);
       const Lanes error_of_paths = select(shown, select(sum.indirect.count < 2.0F, between, own), 0.0F);
       const Lanes scale = sum.direct.mean() + sum.indirect.mean() + 0.1F;
-      error2 += (row.direct_variance + error_of_paths) / (scale * scale);
+      // Reflections are filtered less.
+      const Lanes mirror = select(sum.walked_cover > 0.0F, sum.mirror / sum.walked_cover, 0.0F);
+      error2 += (row.direct_variance + error_of_paths * (1.0F + kMirrorErrors * mirror)) / (scale * scale);
     });
     return path::total(error2) / static_cast<float>(window_.width() * window_.height());
   }

@@ -6,6 +6,7 @@ namespace supple::render::path {
 namespace {
 
 constexpr float kWideLobe = 0.2F;  // from this alpha on, reflections are about as smooth as diffuse light
+constexpr int kInGlass = 24;       // surfaces of glass along a path
 constexpr float kSharp = 0.5F;     // mirrors whose every camera ray goes on
 
 Vec3Lanes turn(const Eigen::Matrix3f& m, const Vec3Lanes& v) {
@@ -54,15 +55,22 @@ Tracer::Meeting Tracer::meet(const RayBundle& rays, Lanes choice, Places& places
     const Lanes density = density_of_face(all_lanes(lamp.area()), -rays.direction.dot(Vec3Lanes(lamp.front)), t);
     met.density = select(nearer, density / static_cast<float>(lights_.rectangles.size()), met.density);
   }
+  if (geometry_.has_media()) {
+    places.item = LaneBits{};
+    places.glass = places.scatter = places.back = LaneMask{};
+    places.bsdf.local = all_lanes(1.0F);
+  }
   met.surface = both(met.surface, ~met.lamp);
   met.ground = both(met.ground, ~met.lamp);
 
   if (any(met.ground)) {
     const Vec3Lanes p = rays.from + met.distance * rays.direction;
     const Lanes clear = clearance(larger(larger(magnitude(p.x()), magnitude(p.y())), std::abs(ground_->height)));
-    places = {.point = p, .normal = Vec3Lanes(Vec3f::UnitZ()), .leave = Vec3Lanes(p.x(), p.y(), ground_->height + clear),
-              .bsdf = {.diffuse = Vec3Lanes(ground_->albedo), .normal_reflectance = Vec3Lanes::Zero(), .grazing_reflectance = Lanes{},
-                       .alpha = all_lanes(1.0F)}};
+    places.point = places.pass = p;
+    places.normal = Vec3Lanes(Vec3f::UnitZ());
+    places.leave = Vec3Lanes(p.x(), p.y(), ground_->height + clear);
+    places.bsdf = {.diffuse = Vec3Lanes(ground_->albedo), .normal_reflectance = Vec3Lanes::Zero(), .grazing_reflectance = Lanes{},
+                   .alpha = all_lanes(1.0F)};
     for (std::size_t k = 0; ground_->pattern != nullptr && k < kLanes; ++k)
       if (met.ground[k] != 0) places.bsdf.diffuse.set_lane(k, ground_->pattern->colour((p.lane(k).head<2>() - ground_->pattern_origin) / ground_->pattern_size));
   }
@@ -76,6 +84,7 @@ Tracer::Meeting Tracer::meet(const RayBundle& rays, Lanes choice, Places& places
     places.bsdf.normal_reflectance.set_lane(k, hit.bsdf.normal_reflectance);
     places.bsdf.grazing_reflectance[k] = hit.bsdf.grazing_reflectance;
     places.bsdf.alpha[k] = hit.bsdf.alpha;
+    if (geometry_.has_media()) put_inside(hit, k, places);
   }
   met.surface |= met.ground;
   return met;
@@ -133,55 +142,81 @@ Vec3Lanes Tracer::lamplight(const Places& places, const Axes& axes, const Vec3La
   const RayBundle to_lamp{.from = places.leave, .direction = direction, .time = to_lights.time, .who = lit};
   const LaneMask blocked = geometry_.blocked(to_lamp, distance * 0.9999F);
   const Lanes density = density_of_face(area, facing, distance) / count;
-  const Vec3Lanes light = f.cwiseProduct(radiance) * (power_share(density, places.bsdf.density(out, in)) / density);
+  Vec3Lanes light = f.cwiseProduct(radiance) * (power_share(density, places.bsdf.density(out, in)) / density);
+  if (geometry_.has_glass()) light = light.cwiseProduct(past_glass(to_lights, places.leave, direction, distance, both(lit, ~blocked)));
   return select(both(lit, ~blocked), light, Vec3Lanes::Zero());
 }
 
 /// Light that comes straight from sun and rectangles.
 Vec3Lanes Tracer::direct(const Places& places, const Axes& axes, const Vec3Lanes& out, const LightRays& to, Random& random) const {
-  const Light sunny = sunlight(places, axes, out, random);
-  const LaneMask lit = both(to.who, sunny.light.maxCoeff() > 0.0F);
+  Light sunny = sunlight(places, axes, out, random);
+  LaneMask lit = both(to.who, sunny.light.maxCoeff() > 0.0F);
   LaneMask shadowed{};
   if (any(lit))
     shadowed = geometry_.blocked({.from = places.leave, .direction = sunny.direction, .time = to.time, .who = lit, .together = to.together});
+  if (geometry_.has_glass()) {
+    sunny.light = sunny.light.cwiseProduct(past_glass(to, places.leave, sunny.direction, all_lanes(INFINITY), both(lit, ~shadowed)));
+    sunny.light = select(places.glass, glint(places, axes, out, to), sunny.light);
+    lit = both(lit | places.glass, to.who);
+  }
   return select(both(lit, ~shadowed), sunny.light, Vec3Lanes::Zero()) + lamplight(places, axes, out, to, random);
+}
+
+/// Share of the light of a lamp that a path meets which counts, where other surfaces look for it by themselves, too.
+/// @param density  over solid angle, with which they do
+Lanes Tracer::counted(const Walk& walk, Lanes density) {
+  return select(walk.lights, all_lanes(1.0F), select(walk.no_lights, Lanes{}, power_share(walk.density, density)));
 }
 
 /// Light from the sky and from other surfaces.
 Vec3Lanes Tracer::indirect(Places& places, const RayBundle& camera_rays, Random& random, Lanes& nearness) const {
   Vec3Lanes sum = Vec3Lanes::Zero();
-  Vec3Lanes weight = Vec3Lanes::Ones();
-  RayBundle rays = camera_rays;
+  Walk walk{.rays = camera_rays, .weight = Vec3Lanes::Ones(), .density = {}, .from_eye = camera_rays.who, .lights = {}, .no_lights = {}};
+  RayBundle& rays = walk.rays;
   rays.together = false;
-  for (int bounce = 1; bounce <= settings_.bounces; ++bounce) {
+  const auto add = [&](LaneMask who, const Vec3Lanes& light) {
+    const Vec3Lanes more = walk.weight.cwiseProduct(light);
+    const Lanes bound = smaller(settings_.largest_indirect / larger(luminance(more), 1e-30F), 1.0F);
+    sum += select(who, more * bound, Vec3Lanes::Zero());
+  };
+  const int most = settings_.bounces + (geometry_.has_glass() ? kInGlass : 0);
+  Lanes turns{};  // at other surfaces than glass
+  for (int bounce = 1; bounce <= most; ++bounce) {
+    const Lanes which = random.number();
+    const Pair<Lanes> u = random.pair();
+    if (geometry_.has_media()) {
+      const LaneMask left = scatter_inside(places, Axes(places.normal).to_local(-rays.direction), which, random.number(), walk);
+      const Vec3Lanes out = Vec3Lanes(Vec3f::UnitZ());
+      if (any(left)) add(left, direct(places, Axes(places.normal), out, {left, rays.time}, random));
+      rays.direction = select(left, -places.normal, rays.direction);
+    }
     const Axes axes(places.normal);
     const Vec3Lanes away = axes.to_local(-rays.direction);
-    const Lanes which = random.number();
-    const Vec3Lanes in = places.bsdf.sample(away, which, random.pair());
-    const Lanes density = places.bsdf.density(away, in);
-    rays.who = both(rays.who, density > 0.0F);
-    weight = weight.cwiseProduct(places.bsdf.evaluate(away, in)) / density;
+    const Vec3Lanes in = places.bsdf.sample(away, which, u);
+    const LaneMask glass = both(rays.who, places.glass);
+    walk.density = places.bsdf.density(away, in);
+    rays.who = both(rays.who, glass | (walk.density > 0.0F));
+    walk.weight = select(glass, walk.weight, walk.weight.cwiseProduct(places.bsdf.evaluate(away, in)) / walk.density);
     if (bounce > 1) {  // Russian roulette (Arvo & Kirk 1990)
-      const Lanes stay = smaller(weight.maxCoeff(), 0.95F);
+      const Lanes stay = select(glass, all_lanes(1.0F), smaller(walk.weight.maxCoeff(), 0.95F));
       rays.who = both(rays.who, random.number() < stay);
-      weight = weight / stay;
+      walk.weight = walk.weight / stay;
     }
+    turns += select(glass, Lanes{}, 1.0F);
+    rays.who = both(rays.who, turns <= static_cast<float>(settings_.bounces));
     if (!any(rays.who)) break;
-    rays.from = places.leave;
-    rays.direction = axes.to_world(in);
+    rays.from = select(glass, rays.from, places.leave);
+    rays.direction = select(glass, rays.direction, axes.to_world(in));
+    if (geometry_.has_glass()) pass_glass(places, axes, away, which, walk);
 
-    const auto add = [&](LaneMask who, const Vec3Lanes& light) {
-      const Vec3Lanes more = weight.cwiseProduct(light);
-      const Lanes bound = smaller(settings_.largest_indirect / larger(luminance(more), 1e-30F), 1.0F);
-      sum += select(who, more * bound, Vec3Lanes::Zero());
-    };
     const Lanes choice = random.number();
     const Meeting met = meet(rays, choice, places);
+    if (geometry_.has_glass()) absorb(met, walk);
     const LaneMask outside = both(rays.who, ~(met.surface | met.lamp));
     const LaneMask sunny = both(outside, lights_.sun.contains(rays.direction));
     add(outside, lights_.sky(rays.direction));
-    if (any(sunny)) add(sunny, sun_radiance_ * power_share(density, all_lanes(sun_density_)));
-    if (any(met.lamp)) add(met.lamp, met.radiance * power_share(density, met.density));
+    if (any(sunny)) add(sunny, sun_radiance_ * counted(walk, all_lanes(sun_density_)));
+    if (any(met.lamp)) add(met.lamp, met.radiance * counted(walk, met.density));
     rays.who = met.surface;
     if (bounce == 1) nearness = select(met.surface, 1.0F / larger(met.distance, least_distance_), 0.0F);
 
@@ -206,7 +241,7 @@ Samples Tracer::sample(const Picks& picks) const {
   const Lanes cover = select(met.ground, of_ground, select(shown, all_lanes(1.0F), 0.0F));
   const BsdfOf<Lanes>& bsdf = places.bsdf;
   const auto on_surfaces = [&](const Vec3Lanes& v) { return select(met.surface, v, Vec3Lanes::Zero()); };
-  out.mirror = select(both(met.surface, bsdf.has_lobe()), larger(1.0F - bsdf.alpha * (1.0F / kWideLobe), 0.0F), 0.0F);
+  out.mirror = select(both(met.surface, places.glass), all_lanes(1.0F), select(both(met.surface, bsdf.has_lobe()), larger(1.0F - bsdf.alpha * (1.0F / kWideLobe), 0.0F), 0.0F));
   const Axes axes(places.normal);
   const Vec3Lanes away = axes.to_local(-rays.direction);
   out.facet = {.cover = cover, .albedo = on_surfaces(bsdf.diffuse + bsdf.normal_reflectance),

@@ -97,6 +97,11 @@ class Tracer {
   struct Places {
     Vec3Lanes point, normal, leave;
     BsdfOf<Lanes> bsdf;
+    Vec3Lanes pass;
+    LaneBits item;           ///< 1 + the item; 0: the ground
+    LaneMask glass, scatter; ///< light goes into the item
+    LaneMask back;           ///< met from inside of it
+    Lanes ratio;             ///< glass: index on this side over that beyond
   };
   /// First hits of rays.
   struct Meeting {
@@ -106,6 +111,19 @@ class Tracer {
     Lanes distance;
     Vec3Lanes radiance;  ///< of the lamp
     Lanes density;       ///< over solid angle, with which lamplight() takes that direction
+  };
+  /// Paths under way.
+  struct Walk {
+    RayBundle rays;
+    Vec3Lanes weight;
+    Lanes density;       ///< over solid angle, with which their directions were taken
+    LaneMask from_eye;   ///< only glass has turned them
+    LaneMask lights;     ///< sun and lamps that they meet count in full
+    LaneMask no_lights;  ///< or not at all
+  };
+  /// Where light leaves a body, at first where it comes in.
+  struct Exit {
+    Vec3f point, normal, leave, pass;
   };
   struct Light {
     Vec3Lanes light;
@@ -124,6 +142,14 @@ class Tracer {
   [[nodiscard]] Light sunlight(const Places& places, const Axes& axes, const Vec3Lanes& out, Random& random) const;
   [[nodiscard]] Vec3Lanes lamplight(const Places& places, const Axes& axes, const Vec3Lanes& out, const LightRays& to, Random& random) const;
   [[nodiscard]] Vec3Lanes direct(const Places& places, const Axes& axes, const Vec3Lanes& out, const LightRays& to, Random& random) const;
+  [[nodiscard]] Vec3Lanes glint(const Places& places, const Axes& axes, const Vec3Lanes& out, const LightRays& to) const;
+  void put_inside(const Hit& hit, std::size_t lane, Places& places) const;
+  void pass_glass(const Places& places, const Axes& axes, const Vec3Lanes& away, Lanes which, Walk& walk) const;
+  [[nodiscard]] LaneMask scatter_inside(Places& places, const Vec3Lanes& away, Lanes which, Lanes seed, Walk& walk) const;
+  [[nodiscard]] Vec3f scattered(std::uint32_t item, const Vec3f& albedo, std::uint32_t seed, float time, Exit& at) const;
+  [[nodiscard]] static Lanes counted(const Walk& walk, Lanes density);
+  void absorb(const Meeting& met, Walk& walk) const;
+  [[nodiscard]] Vec3Lanes past_glass(const LightRays& to, const Vec3Lanes& from, const Vec3Lanes& direction, Lanes distance, LaneMask lit) const;
   [[nodiscard]] Vec3Lanes indirect(Places& places, const RayBundle& camera_rays, Random& random, Lanes& nearness) const;
   [[nodiscard]] Lanes ground_share(const Vec3Lanes& point) const;
 

@@ -296,7 +296,7 @@ Node* Expansion::expand_mapping(Node& mapping, const std::string& key) {
 void Expansion::expand_item(Node& item, const std::string& key, std::vector<Node*>& out) {
   const Node::Entry* entry = item.kind == Node::Kind::Mapping ? item.find("repeat") : nullptr;
   if (entry == nullptr) {
-    out.push_back(expand(item, key));
+    stand(item, key, out);
     return;
   }
   constexpr std::string_view kKey[] = {"repeat"};
@@ -331,13 +331,79 @@ std::vector<std::pair<Expansion::Index, std::size_t>> Expansion::counts_of(const
 void Expansion::repeat(Node& item, std::span<const std::pair<Index, std::size_t>> counts, const std::string& key, std::vector<Node*>& out) {
   if (counts.empty()) {
     count(item, key);
-    if (nodes_ <= kMostNodes) out.push_back(expand(item, key));
+    if (nodes_ <= kMostNodes) stand(item, key, out);
     return;
   }
   indices_.push_back(counts.front().first);
   for (std::size_t i = 0; i < counts.front().second && nodes_ <= kMostNodes; ++i) {
     indices_.back().value = static_cast<double>(i);
     repeat(item, counts.subspan(1), key, out);
+  }
+  indices_.pop_back();
+}
+
+/// An item of a list, and of `objects` one for each time at which its `emit` has one appear.
+void Expansion::stand(Node& item, const std::string& key, std::vector<Node*>& out) {
+  const bool object = key.starts_with("objects[") && item.kind == Node::Kind::Mapping;
+  const Node::Entry* entry = object ? item.find("emit") : nullptr;
+  if (entry == nullptr || entry->value->kind == Node::Kind::Null || entry->value->boolean() == false) {
+    out.push_back(expand(item, key));
+    return;
+  }
+  emit(item, *entry, key, out);
+}
+
+/// A number of a mapping in SI units, of the dimension of `like`. @throws ExpressionFault
+double Expansion::number_of(const Node& mapping, std::string_view name, std::string_view like, double otherwise, const std::string& key) {
+  const Node::Entry* entry = mapping.find(name);
+  if (entry == nullptr) return otherwise;
+  try {
+    const Value value = entry->value->kind == Node::Kind::Scalar ? value_of(*entry->value) : Value{.dimension = {}, .is_text = true, .text = {}};
+    const bool right = !value.is_text && (value.dimension == Dimension{} || value.dimension == read_any_quantity(like)->dimension);
+    if (right && value.number >= 0.0 && std::isfinite(value.number)) return value.number;
+    throw ExpressionFault{"expected a number like " + std::string(like), entry->value->kind == Node::Kind::Scalar ? value.spelt() : entry->value->described(), ""};
+  } catch (const ExpressionFault& fault) {
+    fail(entry->value->mark, key + '.' + std::string(name), fault);
+  }
+  return otherwise;
+}
+
+/// `emit: {rate: 4 Hz, count: 20, from: 1 s}`: objects NAME.1, NAME.2 ... with `appears`, and the index i.
+void Expansion::emit(Node& item, const Node::Entry& entry, const std::string& key, std::vector<Node*>& out) {
+  const std::string place = key + ".emit";
+  const Node& settings = *entry.value;
+  if (settings.kind != Node::Kind::Mapping) {
+    fail(settings.mark, place, {"expected a mapping with rate and count", settings.described(), "emit: {rate: 4 Hz, count: 20}"});
+    return;
+  }
+  constexpr std::string_view kKeys[] = {"rate", "count", "from"};
+  for (const Node::Entry& given : settings.entries) {
+    if (std::find(std::begin(kKeys), std::end(kKeys), given.key) != std::end(kKeys)) continue;
+    fail(given.mark, place, {"expected one of rate, count, from", '\'' + shown(given.key) + '\'', known_hint(given.key, kKeys)});
+  }
+  const double rate = number_of(settings, "rate", "4 Hz", 0.0, place), from = number_of(settings, "from", "1 s", 0.0, place);
+  const double number = number_of(settings, "count", "20", 0.0, place);
+  if (!(rate > 0.0)) return fail(settings.mark, place + ".rate", {"expected a rate above 0", "none", ""});
+  if (!(number >= 1.0) || number != std::floor(number) || number > static_cast<double>(kMostNodes))
+    return fail(settings.mark, place + ".count", {"expected a whole number from 1 to " + std::to_string(kMostNodes), "another", ""});
+  constexpr std::string_view kOwn[] = {"emit"};
+  Node& plain = *without(item, kOwn, tree_);
+  indices_.push_back({"i", 0.0});
+  for (std::size_t i = 0; i < static_cast<std::size_t>(number) && nodes_ <= kMostNodes; ++i) {
+    indices_.back().value = static_cast<double>(i);
+    count(plain, key);
+    Node* copy = tree_.copy(*expand(plain, key));
+    for (Node::Entry& named : copy->entries) {
+      if (named.key != "name" || named.value->kind != Node::Kind::Scalar) continue;
+      named.value = tree_.copy(*named.value);
+      named.value->text += '.' + std::to_string(i + 1);
+    }
+    Node* time = tree_.make(Node::Kind::Scalar, settings.mark);
+    time->text = number_text(from + static_cast<double>(i) / rate);
+    std::erase_if(copy->entries, [](const Node::Entry& other) { return other.key == "appears"; });
+    copy->entries.push_back({"appears", entry.mark, time});
+    measure(*copy);
+    out.push_back(copy);
   }
   indices_.pop_back();
 }

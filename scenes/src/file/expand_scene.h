@@ -1,5 +1,5 @@
 /// @file expand_scene.h
-/// What a scene file says in short, written out before its keys are read: `include`, `variables`, `defaults`, `repeat` and ${expressions}.
+/// What a scene file says in short, written out before its keys are read: `include`, `variables`, `defaults`, `repeat`, `emit` and ${expressions}.
 #pragma once
 
 #include <span>
@@ -53,6 +53,9 @@ class Expansion {
   void expand_item(Node& item, const std::string& key, std::vector<Node*>& out);
   [[nodiscard]] std::vector<std::pair<Index, std::size_t>> counts_of(const Node& repeat, const std::string& key);
   void repeat(Node& item, std::span<const std::pair<Index, std::size_t>> counts, const std::string& key, std::vector<Node*>& out);
+  void stand(Node& item, const std::string& key, std::vector<Node*>& out);
+  void emit(Node& item, const Node::Entry& entry, const std::string& key, std::vector<Node*>& out);
+  [[nodiscard]] double number_of(const Node& mapping, std::string_view name, std::string_view like, double otherwise, const std::string& key);
   void count(const Node& node, const std::string& key);
   void fail(Mark mark, const std::string& key, const ExpressionFault& fault);
 

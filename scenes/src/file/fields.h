@@ -131,6 +131,7 @@ void fields(Archive& archive, ObjectDesc& d) {
   archive("pins", d.pins, {}, "particles whose position or orientation is held");
   archive("loads", d.loads, {}, "external forces and torques");
   archive("cuts", d.cuts, {}, "bonds that break at given times, as with 'breaking'");
+  archive("appears", d.appears, at_least(0.0, kTime), "time from which the object is there, with the velocities of its particles: until then it is held at its place, touches nothing and is not drawn; its energy is external work");
   archive("scale", d.scale, above(0.0, kNumber), "factor of its lengths: of particles but not their 'at', of the skeleton, of 'within' and of meshes. Forces and stiffnesses stay, those of a material follow");
   archive("colour", d.colour, between(0.0, 1.0, kNumber), "sRGB");
   archive("roughness", d.roughness, up_to(1.0, kNumber), "of the drawn surface");

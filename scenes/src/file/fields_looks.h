@@ -24,9 +24,15 @@ void fields(Archive& archive, TextureDesc& d) {
 template <class Archive>
 void fields(Archive& archive, LookDesc& d) {
   using enum ColourByName;
+  using enum BodyName;
   archive("metallic", d.metallic, between(0.0, 1.0, kNumber), "0: plastic; 1: metal, whose reflections have its colour");
   archive("reflectance", d.reflectance, between(0.0, 1.0, kNumber), "of non-metals at normal incidence; 0: matt");
   archive("opacity", d.opacity, up_to(1.0, kNumber), "OpenGL draws it in steps of 1 / samples; shadows are those of an opaque body");
+  archive("body", d.body, {}, "what light does that goes in. opaque: comes back where it went in; translucent: scatters inside, as in wax, milk or skin; glass: is refracted, by a smooth "
+          "surface. The path tracer follows it; shadows of glass have no caustics. OpenGL is an approximation: shadows that bleed, and glass that shows sky and ground but no other bodies");
+  archive("index", d.index, between(1.01, 4.0, kNumber).only("body", d.body, {Glass}), "of refraction: water 1.33, glass 1.5, diamond 2.4");
+  archive("depth", d.depth, above(0.0, kLength).or_auto().only("body", d.body, {Translucent, Glass}),
+          "translucent: mean free path of light, the longer the softer; auto: a fifth of the smallest thickness. glass: way over which white light takes the object's colour; auto: the smallest thickness");
   archive("texture", d.texture, {}, "pattern on the surface; absent: none");
   archive("colour_by", d.colour_by, {}, "what the colour of the surface shows. pressure: contact pressure [Pa]; stretch: d / d0 - 1 of the nearby bonds; speed: of the surface [m/s]");
   archive("map", d.map, Rule{}.only("colour_by", d.colour_by, {Pressure, Stretch, Speed}), "colour map");
@@ -35,9 +41,13 @@ void fields(Archive& archive, LookDesc& d) {
   archive("scale_bar", d.scale_bar, Rule{}.only("colour_by", d.colour_by, {Pressure, Stretch, Speed}), "draws the scale at the right");
   archive("surface", d.surface, {}, "whether the surface is drawn");
   archive("wireframe", d.wireframe, {}, "draws the edges of the triangles");
+  archive("smooth", d.smooth, at_least(0.0, kLength), "pictures even out dimples up to this wide, such as those between the particles of a grid, and keep the volume; where surfaces touch they stay as they are. Files have "
+          "the surface itself; 0: none");
   archive("frames", d.frames, at_least(0.0, kLength), "length of three arrows along each particle's axes, x red, y green, z blue; 0: none");
   archive("bonds", d.bonds, at_least(0.0, kLength), "radius of rods between bonded particles; 0: none");
   archive.check(!d.texture || d.colour_by == Colour, "texture", "expected either texture or colour_by", "both", "");
+  archive.check(d.body != Glass || (!d.texture && d.colour_by == Colour), "body", "expected one colour, as glass has no pattern on its surface", "texture or colour_by", "");
+  archive.check(d.body == Opaque || d.metallic == 0.0, "body", "expected metallic: 0, as no light goes into metal", "both", "");
   const bool values = d.colour_by == Pressure || d.colour_by == Stretch || d.colour_by == Speed;
   archive.check(!values || !archive.given("range") || d.range.x() < d.range.y(), "range", "expected a rising pair",
                 number_text(d.range.x()) + " to " + number_text(d.range.y()), "");

@@ -32,6 +32,7 @@ objects:
 | `defaults` | a mapping of lists of the scene to mappings | keys of every item of a list |
 | `materials` | a mapping of names to mappings | materials that objects may name, `material: jelly`, in place of a mapping |
 | `repeat` | a count, or a mapping of indices to counts | in an item of a list: how often it stands there |
+| `emit` | a mapping of `rate`, `count` and `from` (default 0) | in an item of `objects`: so many of them appear one after the other; they are named NAME.1, NAME.2 ... and have the index `i` |
 
 - **Expressions** stand between `${` and `}`: numbers, numbers with units, variables, `+ - * / ^`, parentheses, `pi`, and `sqrt`, `abs`,
   `min`, `max`, `floor`, `ceil`, `round`, `exp`, `log`, `sin`, `cos`, `tan`, `asin`, `acos`, `atan`, `atan2`. Dimensions are checked. Units
@@ -139,6 +140,10 @@ Json value_schema(const FieldInfo& info) {
       Json item = mapping_schema(info.children);
       item["properties"]["repeat"] = {{"anyOf", Json::array({number_schema({.low = 0.0}, true), {{"type", "object"}}})},
                                       {"description", "copies of the item: a count, with the index i, or a mapping of indices to counts"}};
+      if (info.key == "objects") {
+        item["properties"]["emit"] = {{"type", "object"}, {"required", Json::array({"rate", "count"})},
+                                      {"description", "objects that appear one after the other: rate, count, and from, the time of the first"}};
+      }
       item["properties"]["include"] = {{"anyOf", Json::array({Json{{"type", "string"}}, list_schema({{"type", "string"}}, {}, 0, kAny)})},
                                        {"description", "files whose keys are merged into the item"}};
       return list_schema(std::move(item), info.rule, 0, kAny);

@@ -73,6 +73,9 @@ template <> struct EnumNames<CoreName> {
 template <> struct EnumNames<RendererName> {
   static constexpr std::array<std::string_view, 2> names{"gl", "path"};
 };
+template <> struct EnumNames<BodyName> {
+  static constexpr std::array<std::string_view, 3> names = {"opaque", "translucent", "glass"};
+};
 template <> struct EnumNames<PatternName> {
   static constexpr std::array<std::string_view, 3> names{"checker", "stripes", "picture"};
 };

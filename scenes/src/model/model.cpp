@@ -368,6 +368,21 @@ void expect_resolved(const Model& model, ModelFaults& faults) {
   }
 }
 
+/// Objects that appear later are held until then.
+void add_appearances(const Scene& scene, Model& model) {
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
+    const double time = scene.objects[i].appears;
+    if (time == 0.0) continue;
+    Appearance& appearance = model.appearances.emplace_back(Appearance{.time = time, .object = i, .velocity = {}, .angular_momentum = {}});
+    for (std::uint32_t p = model.objects[i].first; p < model.objects[i].last; ++p) {
+      model.releases.push_back({p, core::kPinPosition | core::kPinOrientation, time});
+      appearance.velocity.push_back(core::free_translation(model.held[p], model.initial.velocity[p]));
+      appearance.angular_momentum.push_back(core::free_rotation(model.held[p], model.initial.angular_momentum[p]));
+    }
+  }
+  std::stable_sort(model.appearances.begin(), model.appearances.end(), [](const Appearance& a, const Appearance& b) { return a.time < b.time; });
+}
+
 /// Pinned particles begin at rest, or the pin would take their momentum in the first step.
 void stop_pinned(Model& model) {
   for (std::size_t i = 0; i < model.particles.size(); ++i) {
@@ -445,6 +460,7 @@ void set_start(const Scene& scene, Model& model, ModelFaults& faults) {
   for (Vec3& momentum : model.rest.angular_momentum) momentum.setZero();
   if (scene.planar) confine_to_plane(model, faults);
   model.held = model.particles.pinned;
+  add_appearances(scene, model);
   model.particles.pinned = pinned_at(model, 0.0);
   stop_pinned(model);
   expect_resolved(model, faults);
@@ -537,10 +553,21 @@ void set_meshing(const Scene& scene, Model& model) {
 
 }  // namespace
 
+bool is_there(const Model& model, std::uint32_t object, double time) {
+  return std::none_of(model.appearances.begin(), model.appearances.end(), [&](const Appearance& appearance) {
+    return appearance.object == object && time < appearance.time * (1.0 - kRounding);
+  });
+}
+
 std::vector<collision::BodyPair> closed_at(const Model& model, double time) {
   std::vector<collision::BodyPair> closed;
   for (const ContactWindow& window : model.windows) {
     if (time < window.from * (1.0 - kRounding) || time >= window.until * (1.0 - kRounding)) closed.push_back(window.pair);
+  }
+  for (const Appearance& appearance : model.appearances) {
+    if (is_there(model, appearance.object, time)) continue;
+    for (std::uint32_t other = 0; other < model.objects.size() + model.fixed.size(); ++other)
+      closed.push_back({std::min(appearance.object, other), std::max(appearance.object, other)});
   }
   std::sort(closed.begin(), closed.end());
   return closed;

@@ -149,6 +149,7 @@ void Simulation::Impl::make_step() {
   update_links();
   hold_volumes();
   lay_to_sleep();
+  make_appear();
   if (state.substep == (1 << state.halvings)) {
     look_for_solids(model, state.record);
     state.substep = 0;

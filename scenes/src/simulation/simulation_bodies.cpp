@@ -127,12 +127,14 @@ void Simulation::Impl::release_pins() {
 
 /// Before a step: lets pairs touch, or pass through each other, from this time on. What this changes of the contact energy is external work.
 void Simulation::Impl::switch_contacts() {
-  if (model.windows.empty()) return;
+  if (model.windows.empty() && model.appearances.empty()) return;
   std::vector<collision::BodyPair> now = closed_at(model, time());
   if (now == model.closed) return;
   const double held = contact_energy();
+  std::vector<collision::BodyPair> changed;
+  std::set_symmetric_difference(now.begin(), now.end(), model.closed.begin(), model.closed.end(), std::back_inserter(changed));
   const auto of_window = [&](std::uint32_t object) {
-    return std::any_of(model.windows.begin(), model.windows.end(), [&](const ContactWindow& window) { return window.pair.a == object || window.pair.b == object; });
+    return std::any_of(changed.begin(), changed.end(), [&](const collision::BodyPair& pair) { return pair.a == object || pair.b == object; });
   };
   std::vector<std::uint32_t> roused;
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
@@ -148,6 +150,28 @@ void Simulation::Impl::switch_contacts() {
     for (const std::uint32_t i : roused) state.sleep.quiet_for[i] = 0.0;
   }
   state.ledger.external_work += contact_energy() - held;
+}
+
+/// After a step: objects whose time came within it get their velocities. They are freed before the next one. Their energy and momentum come from outside.
+void Simulation::Impl::make_appear() {
+  const double now = time(), before = now - dt();
+  const auto due = [&](const Appearance& appearance) {
+    return is_there(model, appearance.object, now) && !is_there(model, appearance.object, before);
+  };
+  if (std::none_of(model.appearances.begin(), model.appearances.end(), due)) return;
+  const double energy = energies().total();
+  const core::Motion motion = core::measure_motion(model.particles, state.particles);
+  for (const Appearance& appearance : model.appearances) {
+    if (!due(appearance)) continue;
+    const auto first = static_cast<std::ptrdiff_t>(model.objects[appearance.object].first);
+    std::copy(appearance.velocity.begin(), appearance.velocity.end(), state.particles.velocity.begin() + first);
+    std::copy(appearance.angular_momentum.begin(), appearance.angular_momentum.end(), state.particles.angular_momentum.begin() + first);
+  }
+  drop_results();
+  const core::Motion after = core::measure_motion(model.particles, state.particles);
+  state.ledger.external_impulse += after.momentum - motion.momentum;
+  state.ledger.external_angular_impulse += after.angular_momentum - motion.angular_momentum;
+  state.ledger.external_work += energies().total() - energy;
 }
 
 /// Between two steps: breaks and yields links. New pieces get new seeds and forces. The energy of surfaces that no longer

@@ -107,6 +107,7 @@ struct Simulation::Impl {
   [[nodiscard]] std::vector<std::uint32_t> due_cuts() const;
   void release_pins();
   void switch_contacts();
+  void make_appear();
   void hold_volumes();
   std::vector<std::uint32_t> wake(const std::vector<std::uint32_t>& which);
   void wake_loaded();

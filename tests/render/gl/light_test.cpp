@@ -324,5 +324,40 @@ TEST(GroundPaint, IsGreyWhereItIsFinerThanAPixel) {
   for (std::size_t i = 0; i < 256; ++i) EXPECT_NEAR(light.rgba[4 * i + 1], 0.25, 0.01);
 }
 
+TEST(LightInside, BendsAroundTranslucentBodiesByBothRenderers) {
+  // The sun from the left: the side away from it is dark on an opaque ball only, and the body as a whole sends back about the same.
+  const Mesh ball = sphere(Vec3::Zero(), 1.0, 48);
+  View view;
+  view.camera = {.from = Vec3(0, -10, 0), .look_at = Vec3::Zero(), .up = Vec3::UnitZ(), .field_of_view = 0.25};
+  view.light = {.direction = Vec3::UnitX(), .intensity = 20.0};
+  for (const RendererKind kind : renderers()) {
+    Item item{.mesh = &ball, .colour = Vec3::Constant(srgb(0.8)), .roughness = 1.0, .reflectance = 0.0};
+    const RenderSettings settings = settings_for(kind, 48);
+    const LinearImage opaque = light_of(settings, view, std::span(&item, 1));
+    item.inside = {.kind = InsideKind::Scatter, .depth = 0.3};
+    const LinearImage soft = light_of(settings, view, std::span(&item, 1));
+    const auto at = [](const LinearImage& image, int x) { return image.rgba[4 * static_cast<std::size_t>(24 * image.width + x) + 1]; };
+    EXPECT_GT(at(soft, 28), 1.4F * at(opaque, 28)) << static_cast<int>(kind);  // beyond the terminator
+    EXPECT_LT(at(soft, 10), at(opaque, 10)) << static_cast<int>(kind);
+    EXPECT_NEAR(mean(soft)[1], mean(opaque)[1], 0.25 * mean(opaque)[1]) << static_cast<int>(kind);
+  }
+}
+
+TEST(LightInside, TurnsThePictureInABallOfGlassByBothRenderers) {
+  // Dark floor below, sky above: a ball of glass shows them upside down.
+  const Mesh ball = sphere(Vec3(0, 0, 2), 1.0, 48);
+  View view;
+  view.camera = {.from = Vec3(0, -10, 2), .look_at = Vec3(0, 0, 2), .up = Vec3::UnitZ(), .field_of_view = 0.25};
+  view.light = {.direction = Vec3(0, 0, -1), .intensity = 0.0};
+  view.ground = Ground{.height = 0.0, .colour = Vec3::Constant(srgb(0.05))};
+  for (const RendererKind kind : renderers()) {
+    const Item item{.mesh = &ball, .colour = Vec3::Ones(), .inside = {.kind = InsideKind::Glass, .index = 1.5}};
+    const LinearImage image = light_of(settings_for(kind, 48), view, std::span(&item, 1));
+    const auto at = [&](int y) { return image.rgba[4 * static_cast<std::size_t>(y * image.width + 24) + 1]; };
+    EXPECT_NEAR(at(33), 1.0, 0.12) << static_cast<int>(kind);
+    EXPECT_LT(at(15), 0.3) << static_cast<int>(kind);
+  }
+}
+
 }  // namespace
 }  // namespace supple::render::test

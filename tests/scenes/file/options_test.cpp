@@ -271,6 +271,7 @@ void add_object_rules(std::vector<Option>& all) {
   in_object("yielding.energy", "$" + pull, "yielding: {energy: 1e9}", "yielding: {energy: 0.01}");
   in_object("yielding.time", "yielding: {energy: 0.01, time: $}" + pull, "0", "1");
   const std::string turned = "loads: [{particle: 0, force: [40, 0, 5]}]\n    cuts: ";
+  in_object("appears", "appears: $", "0", "0.1");
   in_object("cuts.time", turned + "[{time: $, particles: [0, 1]}]", "0.05", "0.15");
   in_object("cuts.particles", turned + "[{time: 0.05, particles: $}]", "[0, 1]", "[1, 2]");
   in_object("cuts.at", turned + "[{time: 0.05, at: $, normal: [1, 0, 0]}]", "[-0.3, 0, 0]", "[0.1, 0, 0]");
@@ -513,6 +514,10 @@ void add_pictures(std::vector<Option>& all) {
   look("roughness", "roughness: $", "0.45", "0.1");
   look("look.metallic", "look: {metallic: $}", "0", "1");
   look("look.reflectance", "look: {reflectance: $}", "0.04", "0.4");
+  look("look.body=translucent", "look: {body: $}", "opaque", "translucent");
+  look("look.body=glass", "look: {body: $}", "opaque", "glass");
+  look("look.index", "look: {body: glass, index: $}", "1.5", "2.4");
+  look("look.depth", "look: {body: translucent, depth: $}", "0.01", "0.1");
   all.push_back(differs("objects.look.opacity", In::Picture,
                         {.object = "look: {opacity: $}", .scene = camera + "output: {images: {size: [48, 36], samples: 4}}\n"}, "1", "0.5"));
   look("look.texture.pattern=stripes", "look: {texture: {pattern: $, size: 0.07}}", "checker", "stripes");
@@ -534,6 +539,7 @@ void add_pictures(std::vector<Option>& all) {
                          .scene = camera + "output: {images: {size: [160, 120], samples: 1}}\n"}, "true", "false"));
   look("look.surface", "look: {surface: $}", "true", "false");
   look("look.wireframe", "look: {wireframe: $}", "false", "true");
+  look("look.smooth", "look: {smooth: $}", "0", "0.4");
   look("look.frames", "look: {surface: false, frames: $}", "0", "0.2");
   look("look.bonds", "look: {surface: false, bonds: $}", "0", "0.05");
   const auto scene = [&](const std::string& key, const std::string& text, const std::string& one, const std::string& other) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
@@ -270,6 +271,79 @@ TEST(ContactTimes, ContinueFromASavedStateWithTheSameBits) {
 TEST(ContactTimes, WakeWhatRests) {
   const Simulation simulation = at_end("sleep: {time: 0.1}\n" + std::string(kFalling) + "until: 0.75}]\n");
   EXPECT_NEAR(simulation.state().particles.velocity[0].z(), -2.5, 0.1);
+}
+
+constexpr const char* kEmitter = "gravity: [0, 0, -8]\nobjects:\n  - name: ball\n    emit: {rate: 4 Hz, count: 3, from: 0.25 s}\n"
+                                 "    particles: {arrange: single, at: [\"${i}\", 0, 1], velocity: [\"${i + 1}\", 0, 0], spin: [0, 0, 2], mass: 2}\n"
+                                 "    skeleton: [{shape: point, kernel: {radius: 0.2}}]\n    contact: {modulus: 1000}\n";
+
+TEST(Emitters, LetObjectsAppearAtTheirRate) {
+  Simulation simulation(read(kEmitter));
+  ASSERT_EQ(simulation.scene().objects.size(), 3u);
+  EXPECT_EQ(simulation.scene().objects[1].name, "ball.2");
+  while (simulation.frame() < simulation.scene().frame_count()) {
+    const double t = simulation.time();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double way = std::max(t - 0.25 * static_cast<double>(k + 1), 0.0), speed = static_cast<double>(k + 1);
+      const Vec3 place = simulation.state().particles.position[k];
+      EXPECT_NEAR(place.x(), static_cast<double>(k) + speed * way, 1e-9) << t;
+      EXPECT_NEAR(place.z(), 1.0 - 4.0 * way * way, 1e-9) << t;
+      const bool there = t >= 0.25 * static_cast<double>(k + 1) - 1e-9;
+      EXPECT_EQ(simulation.meshes()[k].position.empty(), !there) << t;
+      EXPECT_EQ(simulation.state().particles.velocity[k].x(), there ? speed : 0.0) << t;
+    }
+    simulation.step_frame();
+  }
+  // What they bring is the work of others.
+  const RunRecord& record = simulation.state().record;
+  EXPECT_LT(record.momentum_error, 1e-12 * record.momentum_scale);
+  EXPECT_LT(record.energy_error, 1e-9 * record.largest_energy);
+}
+
+TEST(Emitters, TouchNothingBeforehand) {
+  // A ball flies through the place where another one appears later.
+  const std::string text = "objects:\n  - name: first\n    particles: {arrange: single, at: [-0.5, 0.02, 0], velocity: [2, 0, 0], mass: 1}\n"
+                           "    skeleton: [{shape: point, kernel: {radius: 0.3}}]\n    contact: {modulus: 1e4}\n"
+                           "  - name: second\n    appears: $\n    particles: {arrange: single, mass: 1}\n"
+                           "    skeleton: [{shape: point, kernel: {radius: 0.3}}]\n    contact: {modulus: 1e4}\n";
+  const auto with = [&](const std::string& time) {
+    std::string out = text;
+    return at_end(out.replace(out.find('$'), 1, time));
+  };
+  EXPECT_EQ(with("0.75").state().particles.velocity[0], Vec3(2, 0, 0));
+  EXPECT_LT(with("0").state().particles.velocity[0].x(), 1.0);
+}
+
+TEST(Emitters, ContinueFromASavedStateWithTheSameBits) {
+  Simulation whole(read(kEmitter));
+  std::vector<State> states;
+  while (whole.frame() < whole.scene().frame_count()) {
+    states.push_back(whole.state());
+    whole.step_frame();
+  }
+  for (const State& state : states) {
+    Simulation again(read(kEmitter));
+    again.restore(state);
+    while (again.frame() < again.scene().frame_count()) again.step_frame();
+    EXPECT_EQ(again.state().hash(), whole.state().hash()) << state.frame;
+  }
+}
+
+TEST(Emitters, SayWhatIsWrong) {
+  const auto message = [](const std::string& emit) {
+    try {
+      (void)read("objects:\n  - name: a\n    emit: " + emit + "\n    particles: {arrange: single}\n");
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_NE(message("{count: 3}").find("expected a rate above 0"), std::string::npos) << message("{count: 3}");
+  EXPECT_NE(message("{rate: 4 Hz}").find("expected a whole number from 1"), std::string::npos);
+  EXPECT_NE(message("{rate: 4 m, count: 3}").find("expected a number like 4 Hz, found 4 m"), std::string::npos) << message("{rate: 4 m, count: 3}");
+  EXPECT_NE(message("{rate: 4 Hz, count: 2.5}").find("expected a whole number"), std::string::npos);
+  EXPECT_NE(message("{rate: 4 Hz, count: 2, until: 3 s}").find("expected one of rate, count, from"), std::string::npos);
+  EXPECT_NE(message("4").find("expected a mapping with rate and count"), std::string::npos);
 }
 
 TEST(Cuts, BreakBondsAtTheirTime) {

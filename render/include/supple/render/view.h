@@ -3,6 +3,7 @@
 /// [0, 1] and become linear light (IEC 61966-2-1) before anything is computed with them.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -27,7 +28,7 @@ struct Camera {
 };
 
 struct Light {
-  Vec3 direction = Vec3(-0.45, 0.35, -1.0);  ///< direction in which the light travels
+  Vec3 direction = Vec3(-0.50, 0.40, -1.0);  ///< direction in which the light travels
   double intensity = 3.0;                    ///< irradiance over pi, relative to the radiance of the sky
 };
 
@@ -65,12 +66,25 @@ struct Paint {
 
 struct Ground {
   double height = 0.0;                       ///< z [m]
-  Vec3 colour = Vec3(0.80, 0.80, 0.78);      ///< sRGB, fades to the background with distance
+  Vec3 colour = Vec3(0.58, 0.57, 0.55);      ///< sRGB, fades to the background with distance
   Paint paint = {};                          ///< Checker, Stripes or Picture, by world x and y; or Plain
 };
 
 /// Values and gradients of a field at points [m]; inside > 0. Called from several threads at once.
 using SurfaceField = std::function<void(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients)>;
+
+/// What light does that goes into an item, whose mesh is then closed.
+enum class InsideKind : std::uint8_t {
+  Opaque,   ///< comes back where it goes in
+  Scatter,  ///< scatters evenly in all directions until it leaves; the mean over a thick body is Item::colour
+  Glass,    ///< is refracted at the smooth surface, whatever Item::roughness says
+};
+
+struct Inside {
+  InsideKind kind = InsideKind::Opaque;
+  double index = 1.5;                        ///< Glass: of refraction, above 1
+  double depth = 0.0;                        ///< Scatter: mean free path, above 0; Glass: way over which white light takes the item's colour, 0: clear [m]
+};
 
 struct Item {
   const Mesh* mesh = nullptr;                ///< may be empty
@@ -84,6 +98,7 @@ struct Item {
   double reflectance = 0.04;                 ///< of the clear coat at normal incidence; 0: matt
   SurfaceField field = {};                   ///< field whose zero set the mesh approximates; the path tracer intersects it instead of the triangles
   double field_reach = 0.0;                  ///< largest distance of the surface from its triangle [m]
+  Inside inside = {};
   bool wireframe = false;                    ///< edges of the triangles, dark on a surface, in the item's colour without
 };
 
@@ -91,8 +106,8 @@ struct View {
   Camera camera;
   Light light;
   std::optional<Ground> ground;
-  Vec3 background_top = Vec3(0.62, 0.71, 0.82);     ///< sRGB
-  Vec3 background_bottom = Vec3(0.93, 0.94, 0.95);  ///< sRGB
+  Vec3 background_top = Vec3(0.40, 0.45, 0.52);     ///< sRGB
+  Vec3 background_bottom = Vec3(0.80, 0.80, 0.79);  ///< sRGB
   std::vector<AreaLight> area_lights = {};          ///< OpenGL uses the first four
 };
 

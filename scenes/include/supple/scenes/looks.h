@@ -24,11 +24,16 @@ struct TextureDesc {
 enum class ColourByName : std::uint8_t { Colour, Pressure, Stretch, Speed, Normals };
 enum class MapName : std::uint8_t { Viridis, Magma, Coolwarm, Turbo, Grey };
 
+enum class BodyName : std::uint8_t { Opaque, Translucent, Glass };
+
 /// objects[].look
 struct LookDesc {
   double metallic = 0.0;
   double reflectance = 0.04;          ///< of non-metals at normal incidence
   double opacity = 1.0;
+  BodyName body = BodyName::Opaque;
+  double index = 1.5;                 ///< glass: of refraction
+  std::optional<double> depth;        ///< translucent: mean free path; glass: way over which light takes the colour [m]; absent: by the thickness
   std::optional<TextureDesc> texture;
   ColourByName colour_by = ColourByName::Colour;
   MapName map = MapName::Viridis;
@@ -36,6 +41,7 @@ struct LookDesc {
   bool scale_bar = true;
   bool surface = true;
   bool wireframe = false;
+  double smooth = 0.0;                ///< width of the dimples that pictures even out [m]; 0: none
   double frames = 0.0;                ///< length of the arrows at each particle [m]; 0: none
   double bonds = 0.0;                 ///< radius of the rods between bonded particles [m]; 0: none
 };
@@ -62,9 +68,9 @@ struct CameraDesc {
 };
 
 struct LightDesc {
-  Vec3 direction = Vec3(-0.45, 0.35, -1.0);
+  Vec3 direction = Vec3(-0.50, 0.40, -1.0);
   double intensity = 3.0;             ///< irradiance over pi, relative to the radiance of the sky
-  double softness = 0.03;             ///< angular radius [rad] (key softness_deg)
+  double softness = 0.045;            ///< angular radius [rad] (key softness_deg)
 };
 
 /// lights[]: rectangles that shine on the side they face
@@ -90,8 +96,8 @@ struct RenderDesc {
 };
 
 struct BackgroundDesc {
-  Vec3 top = Vec3(0.62, 0.71, 0.82);     ///< sRGB
-  Vec3 bottom = Vec3(0.93, 0.94, 0.95);  ///< sRGB
+  Vec3 top = Vec3(0.40, 0.45, 0.52);     ///< sRGB
+  Vec3 bottom = Vec3(0.80, 0.80, 0.79);  ///< sRGB
 };
 
 }  // namespace supple::scenes

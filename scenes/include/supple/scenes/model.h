@@ -125,12 +125,21 @@ struct CutEvent {
   std::vector<std::uint32_t> links;
 };
 
+/// An object that is not there from the start.
+struct Appearance {
+  double time = 0.0;                   ///< [s]
+  std::uint32_t object = 0;
+  std::vector<Vec3> velocity;          ///< of its particles [m/s]
+  std::vector<Vec3> angular_momentum;  ///< [kg m^2/s]
+};
+
 struct Model {
   core::ParticleSet particles;            ///< with the pins of the present time
   std::vector<std::uint8_t> held;         ///< pins without an end, shape [particles]
   std::vector<PinRelease> releases;
   std::vector<core::LedPin> led;          ///< pins that move, particles ascending
   std::vector<CutEvent> cuts;
+  std::vector<Appearance> appearances;    ///< by time
   core::ParticleState initial;
   core::ParticleState rest;               ///< rest poses (the initial arrangement)
   core::Interactions interactions;        ///< of the unbroken scene
@@ -154,7 +163,9 @@ struct Model {
   Believable believable;
 };
 
-/// Pairs of `windows` that cannot touch at a time, sorted.
+/// Whether an object has appeared at a time [s].
+[[nodiscard]] bool is_there(const Model& model, std::uint32_t object, double time);
+/// Pairs of `windows` that cannot touch at a time, and those of objects that are not there yet, sorted.
 [[nodiscard]] std::vector<collision::BodyPair> closed_at(const Model& model, double time);
 /// Whether two objects or fixed bodies can touch at the present time.
 [[nodiscard]] bool may_touch(const Model& model, std::uint32_t a, std::uint32_t b);

@@ -322,6 +322,7 @@ struct ObjectDesc {
   std::vector<PinDesc> pins;
   std::vector<LoadDesc> loads;
   std::vector<CutDesc> cuts;
+  double appears = 0.0;                     ///< time from which the object is there [s]
   double scale = 1.0;                       ///< of its lengths, which reading has multiplied by it
   Vec3 colour = Vec3(0.8, 0.8, 0.8);        ///< sRGB
   double roughness = 0.45;
@@ -384,7 +385,7 @@ struct SleepDesc {
 
 struct GroundDesc {
   double height = 0.0;                ///< [m]
-  Vec3 colour = Vec3(0.80, 0.80, 0.78);
+  Vec3 colour = Vec3(0.58, 0.57, 0.55);
   std::optional<TextureDesc> texture;
   bool visible = true;
   bool collides = true;

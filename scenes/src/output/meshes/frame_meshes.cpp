@@ -406,6 +406,7 @@ std::vector<Mesh> polygonise_objects(const StageContext& context, const Division
   for (const implicit::CreaseMesher& mesher : frame.creases) budget.add(mesher);
   for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
     if (bodies[i].skeleton.primitive.empty() || std::binary_search(division.body.begin(), division.body.end(), i)) continue;
+    if (!is_there(model, bodies[i].object, context.time)) continue;
     if (context.shown != nullptr && !(*context.shown)(frame.field[i].surface_box())) {
       profile.present += 1;
     } else {

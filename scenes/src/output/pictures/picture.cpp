@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 
 #include "file/scene_places.h"
 #include "output/meshes/look_columns.h"
+#include "output/pictures/even_surface.h"
 #include "output/pictures/smooth_normals.h"
 #include "supple/collision/sleep.h"
 #include "supple/render/glyphs.h"
@@ -68,6 +70,10 @@ render::RenderSettings settings_of(const Scene& scene, render::ContextKind conte
     settings.height = scene.output.images->size.at(1);
     settings.samples = scene.output.images->samples;
   }
+  // Edges of shadows as fine as the pixels that show them: the map costs as much as a small picture.
+  constexpr std::size_t kTexelsAPixel = 2, kLeastMap = 256, kLargestMap = 2048;
+  const auto edge = static_cast<std::size_t>(std::max(settings.width, settings.height));
+  settings.shadow_size = static_cast<int>(std::clamp(std::bit_ceil(kTexelsAPixel * edge) / 2, kLeastMap, kLargestMap));
   settings.shadow_softness = scene.light.softness;
   settings.context = context;
   settings.kind = scene.render.renderer == RendererName::Path ? render::RendererKind::Path : render::RendererKind::Gl;
@@ -106,6 +112,17 @@ render::View view_of(const Scene& scene) {
                                 .radiance = d.intensity});
   }
   return view;
+}
+
+/// @param thickness  the smallest one of the object [m]
+render::Inside inside_of(const LookDesc& look, double thickness) {
+  constexpr double kFreePath = 0.2;  // over the thickness
+  switch (look.body) {
+    case BodyName::Translucent: return {.kind = render::InsideKind::Scatter, .depth = look.depth.value_or(kFreePath * thickness)};
+    case BodyName::Glass: return {.kind = render::InsideKind::Glass, .index = look.index, .depth = look.depth.value_or(thickness)};
+    case BodyName::Opaque: break;
+  }
+  return {};
 }
 
 struct Quantity {
@@ -249,14 +266,23 @@ void ScenePictures::warn_inside(Simulation& simulation, std::size_t camera) {
   }
 }
 
+const Mesh& ScenePictures::shown_mesh(const std::vector<Mesh>& meshes, std::size_t object) {
+  const double width = scene_.objects[object].look.smooth;
+  if (width == 0.0) return meshes[object];
+  Mesh& even = even_meshes_.emplace_back(meshes[object]);
+  even_surface(width, shared_vertices(meshes, object), even);
+  return even;
+}
+
 void ScenePictures::add_objects(Simulation& simulation) {
   const std::vector<Mesh>& meshes = simulation.meshes();
+  even_meshes_.clear();
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const ObjectDesc& d = scene_.objects[i];
     if (!d.look.surface && !d.look.wireframe) continue;
-    add({.mesh = &meshes[i], .colour = d.colour, .roughness = d.roughness, .metallic = d.look.metallic,
+    add({.mesh = &shown_mesh(meshes, i), .colour = d.colour, .roughness = d.roughness, .metallic = d.look.metallic,
          .opacity = d.look.opacity, .paint = paints_[i], .surface = d.look.surface,
-         .reflectance = d.look.reflectance, .wireframe = d.look.wireframe},
+         .reflectance = d.look.reflectance, .inside = inside_of(d.look, 2.0 * simulation.model().objects[i].iso_radius), .wireframe = d.look.wireframe},
         d.name);
   }
   if (scene_.render.renderer == RendererName::Path && scene_.render.exact_surface) add_fields(simulation);
@@ -371,6 +397,7 @@ void ScenePictures::add_glyphs(const Simulation& simulation) {
   for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
     const LookDesc& look = scene_.objects[i].look;
     const ObjectModel& object = simulation.model().objects[i];
+    if (!is_there(simulation.model(), static_cast<std::uint32_t>(i), simulation.time())) continue;
     if (look.frames > 0.0) {
       std::vector<Pose> poses;
       for (std::uint32_t p = object.first; p < object.last; ++p) poses.push_back({state.position[p], state.orientation[p]});

@@ -44,6 +44,7 @@ class ScenePictures {
  private:
   void warn_inside(Simulation& simulation, std::size_t camera);
   void add_objects(Simulation& simulation);
+  [[nodiscard]] const Mesh& shown_mesh(const std::vector<Mesh>& meshes, std::size_t object);
   void add_fields(Simulation& simulation);
   void add_glyphs(const Simulation& simulation);
   void add(render::Item item, std::string name);
@@ -62,6 +63,7 @@ class ScenePictures {
   double cell_ = 0.0;        ///< of the scene
   std::vector<std::string> warnings_;
   std::deque<Mesh> glyphs_;  ///< of this picture
+  std::deque<Mesh> even_meshes_;  ///< of this picture, of objects with look.smooth
 };
 
 }  // namespace supple::scenes
