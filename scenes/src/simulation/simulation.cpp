@@ -112,8 +112,9 @@ void Simulation::Impl::step() {
   timed = false;
   if (state.substep == 0) {
     const double before = process_cpu_seconds();
-    book_audits();
+    const std::optional<RunRecord::Overload> passing = book_audits();
     p.apart_s += process_cpu_seconds() - before;
+    if (passing && scene.contact.core == CoreName::Soft) throw_passing(*passing);
     check_energy();
   }
   p.scale();
