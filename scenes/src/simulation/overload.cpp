@@ -17,6 +17,9 @@ std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
   return kAlike | context.bodies[body].object;
 }
 
+/// @param inverse  of the mass [1/kg]; 0: fixed bodies @return [J]
+double energy_of_approach(double speed, double inverse) { return speed > 0.0 && inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0; }
+
 /// Kinetic energy of approach [J] of the masses that the contact moves: of one particle bodies all, of others what is near.
 class MovedMasses {
  public:
@@ -25,8 +28,7 @@ class MovedMasses {
   [[nodiscard]] double energy(const collision::ContactSurface::Summary& s, double speed) {
     if (!(speed > 0.0)) return 0.0;
     if (mobility_.empty()) find_mobility(context_, particles_, frame_, mobility_);
-    const double inverse = collision::approach_inverse_mass(frame_.bodies, mobility_, s);
-    return inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0;
+    return energy_of_approach(speed, collision::approach_inverse_mass(frame_.bodies, mobility_, s));
   }
 
  private:
@@ -106,9 +108,7 @@ std::optional<RunRecord::Overload> OverloadWatch::look(const StageContext& conte
                                                        RunRecord& record) {
   const auto& summary = frame.surface.summary;
   const auto kinetic_energy = [&](const collision::ContactSurface::Summary& s, const collision::Approach& approach) {
-    const double speed = std::max(approach.speed, 0.0);
-    const double inverse = 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b);
-    return inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0;
+    return energy_of_approach(approach.speed, 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b));
   };
   constexpr double kSafety = 0.45;  // of a coarse capacity, where half is the bound
   const auto suspicious = [&](const collision::ContactSurface::Summary& s, double kinetic, double coarse) {
@@ -129,7 +129,7 @@ std::optional<RunRecord::Overload> OverloadWatch::look(const StageContext& conte
     }
   });
   std::optional<RunRecord::Overload> passing;
-  MovedMasses moved(context, particles, frame);
+  MovedMasses masses(context, particles, frame);
   for (std::size_t k = 0; k < summary.size(); ++k) {
     if (looked_at_[k] == 0) continue;
     const collision::ContactSurface::Summary& s = summary[k];
@@ -147,7 +147,7 @@ std::optional<RunRecord::Overload> OverloadWatch::look(const StageContext& conte
     double& worst = worst_[s.bodies];
     constexpr int kCells = 24;
     constexpr double kWorthMeasuring = 1.02, kAtRest = 0.01;  // the latter of the capacity
-    const double moving = pressed > kSafety * coarse ? moved.energy(s, approach.speed) : 0.0;
+    const double moving = pressed > kSafety * coarse ? masses.energy(s, approach.speed) : 0.0;
     const bool may_pass = moving > kAtRest * coarse && pressed + moving > 2.0 * kSafety * coarse;
     const double contact = collision::shifted_energy(a, b, Vec3::Zero(), approach.normal, kCells), energy = kinetic + contact;
     if (!may_pass && !(energy > kWorthMeasuring * worst)) continue;
