@@ -88,7 +88,7 @@ class Signals(unittest.TestCase):
         self.ends_soon("run", "long.yaml", "--overwrite", "--set", "render.renderer=path")
 
     def test_in_a_mesh(self):
-        self.ends_soon("query", "mesh", "long.yaml", "--cells", "512", "--out", "mesh.ply", *MEMORY)
+        self.ends_soon("query", "mesh", "long.yaml", "--cells", "768", "--out", "mesh.ply", *MEMORY)
         self.assertFalse((SCRATCH / "mesh.ply").exists())
 
 
