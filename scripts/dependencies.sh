@@ -11,13 +11,14 @@ declare -A supple_packages=(
   [run]="libosmesa6 libegl1 libgl1-mesa-dri ffmpeg"
   [test]="libgtest-dev libcgal-dev libnifti-dev libteem-dev libopenvdb-tools"
   [python]="pybind11-dev python3-dev python3-numpy python3-venv"
-  [check]="clang clang-tidy libclang-rt-dev"
+  [fuzz]="clang libclang-rt-14-dev"
+  [check]="clang clang-tidy libclang-rt-14-dev"
   [docs]="doxygen python3-venv"
   [deb]="dpkg-dev mmdebstrap"
   [data]="libcgal-demo"
 )
 declare -A supple_purpose=(
-  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, Delaunay meshes and fits of meshes and volumes" [python]="for the Python package" [check]="for the second compiler and static analysis" [docs]="for the documentation site" [deb]="to try the Debian package" [data]="data to fit"
+  [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, Delaunay meshes and fits of meshes and volumes" [python]="for the Python package" [fuzz]="for the fuzz targets" [check]="for the second compiler and static analysis" [docs]="for the documentation site" [deb]="to try the Debian package" [data]="data to fit"
 )
 
 # missing_packages NAME...: prints those that dpkg does not list as installed.

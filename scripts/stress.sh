@@ -15,7 +15,7 @@ for word in "$@"; do
 done
 
 install_packages build run test
-[[ " $* " != *" libfuzzer "* ]] || install_packages check
+[[ " $* " != *" libfuzzer "* ]] || install_packages fuzz
 # Another build folder is used as it is, without building.
 if [[ $build == "$supple_root/build/release" ]]; then
   log=$supple_root/build/logs/stress_build.log

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Everything a change must pass: optimised build and tests, the tests under address and undefined-behaviour
-# sanitizers, a minimal external project on the installed package, and a small film from end to end.
+# sanitizers, the fuzz targets of meshes, tables and pictures for a minute each, a minimal external project on the installed package, and a small film from
+# end to end.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/dependencies.sh"
@@ -27,7 +28,7 @@ small_film() {
 }
 
 logs=$supple_root/build/logs
-install_packages build run test python
+install_packages build run test python fuzz
 
 part "planted defects have places" "$logs/mutate_check.log" "$here/mutate.sh" --check || true
 part "names in files built together" "$logs/together.log" "$here/together.py" || true
@@ -43,6 +44,11 @@ if part "build (sanitizers)" "$logs/build_asan.log" configure_and_build asan all
   part "tests (sanitizers)" "$logs/tests_asan.log" run_tests asan || true
 else
   skip_part "tests (sanitizers)" "no build"
+fi
+if part "build (fuzz targets)" "$logs/build_fuzz.log" configure_and_build asan_clang fuzz_files; then
+  part "fuzz targets" "$logs/fuzz.log" run_tests fuzz_files || true
+else
+  skip_part "fuzz targets" "no build"
 fi
 
 print_summary

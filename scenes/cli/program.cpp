@@ -1,12 +1,15 @@
 #include "program.h"
 
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <new>
+#include <string_view>
 
 #include "last_resort.h"
 #include "print.h"
@@ -23,9 +26,35 @@ namespace {
 
 constexpr int kSignalExit = 128;
 
+double seconds_of(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// When the program was interrupted: of the clock and of its processor time [s].
+double interrupted_at = 0.0, interrupted_after = 0.0;
+
+/// Ends the program as a kill does where its work has not ended within a second, as inside a library it may not: all that is complete on the disk stays. On a busy
+/// machine work that has had little processor time gets ten seconds.
+void end_if_late(int /*number*/) {
+  constexpr double kSoon = 0.8, kLate = 10.0, kWork = 0.5;
+  const double waited = seconds_of(CLOCK_MONOTONIC) - interrupted_at;
+  if (waited < kSoon || (waited < kLate && seconds_of(CLOCK_PROCESS_CPUTIME_ID) - interrupted_after < kWork)) return;
+  constexpr std::string_view kMessage = "interrupted, in the middle of a calculation\n";
+  (void)!write(STDERR_FILENO, kMessage.data(), kMessage.size());
+  _exit(kSignalExit + interrupted);
+}
+
+/// The timer is neither inherited by programs that are started nor needed without a signal.
 void on_signal(int number) {
   interrupted = number;
   std::signal(number, SIG_DFL);
+  interrupted_at = seconds_of(CLOCK_MONOTONIC);
+  interrupted_after = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
+  constexpr timeval kLook{.tv_sec = 0, .tv_usec = 50'000};
+  const itimerval often{.it_interval = kLook, .it_value = kLook};
+  setitimer(ITIMER_REAL, &often, nullptr);
 }
 
 void ignore(int /*number*/) {}
@@ -34,6 +63,7 @@ void ignore(int /*number*/) {}
 void heed_signals() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  std::signal(SIGALRM, end_if_late);
   std::signal(SIGPIPE, ignore);
 }
 

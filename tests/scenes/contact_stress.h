@@ -15,7 +15,7 @@ namespace supple::scenes::stress {
 
 enum class Outcome {
   Held,        ///< nothing passed, energy within Verlet's swing
-  Overloaded,  ///< more than the pair can hold; the run reports it
+  Overloaded,  ///< more than the pair can hold; the run reports it, and ends where one body passes the other
   Gains,       ///< more energy than there was
   Passed,      ///< one body is behind the other and no warning was given, or in spite of a barrier
   Stopped,     ///< ended by an error: diverged, or too many substeps
@@ -75,8 +75,8 @@ Result judge(const std::string& scene, int frames, bool valid, const Done& done,
       result.outcome = Outcome::Gains;
     }
   } catch (const Error& error) {
-    result.outcome = Outcome::Stopped;
     result.reason = error.what();
+    result.outcome = result.reason.find("pass through each other") != std::string::npos ? Outcome::Overloaded : Outcome::Stopped;
   }
   return result;
 }

@@ -199,7 +199,10 @@ LinkState unbroken(const Links& links) {
 
 LinkChange update_links(const LinkedParticles& linked, const Links& links, double dt, LinkState& links_state, Ledger& ledger,
                         std::span<const std::uint32_t> cut) {
-  const auto& [set, state, present] = linked;
+  // Names for the lambda below, where clang 14 takes no structured bindings.
+  const ParticleSet& set = linked.set;
+  const ParticleState& state = linked.state;
+  const Interactions& present = linked.present;
   SUPPLE_EXPECTS(links_state.broken.size() == links.size() && dt >= 0.0);
   LinkChange change;
   thread_local std::vector<LinkLoad> load;

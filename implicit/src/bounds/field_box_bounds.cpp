@@ -210,7 +210,10 @@ struct BoxNodes {
 
 /// Balls of gradients that F may have in a box, from those of the nodes [1/m]. @param half  the box's extent, halved
 void find_hull(const BlendIndex& blend, const BoxNodes& of, const Vec3& half, std::vector<GradientBounds::Ball>& hull) {
-  const auto& [nodes, bounds, terms] = of;
+  // Names for the lambdas below, where clang 14 takes no structured bindings.
+  const std::span<const Expansion> nodes = of.nodes;
+  const std::span<const BlendIndex::NodeBound> bounds = of.bounds;
+  const std::span<const BlendIndex::Term> terms = of.terms;
   const double reach = half.norm(), largest = half.maxCoeff();
   using Ball = GradientBounds::Ball;
   const auto ball = [&](std::size_t k) { return Ball{nodes[k].gradient, nodes[k].turn(reach) + nodes[k].round_off() / largest}; };

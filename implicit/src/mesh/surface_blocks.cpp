@@ -11,6 +11,7 @@
 #include "mesh/partition/polygonise_blocks.h"
 #include "mesh/partition/range_of_surface.h"
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 #include "supple/implicit/mesh_limits.h"
 
 namespace supple::implicit {
@@ -89,6 +90,7 @@ std::optional<std::int32_t> outermost(const BlockRange& range, std::size_t axis,
   const int size = first_cubes(range, first);
   for (const Cube& cube : first) add(cube, size);
   for (std::size_t halved = 0; !open.empty() && halved < kMostOutermost; ++halved) {
+    heed_scope();
     const Open now = open.top();
     if (now.size == 0) return now.out;
     open.pop();

@@ -29,23 +29,26 @@ std::string not_solved(const CrowdedStart& crowd) {
 }
 
 std::string unfinished(const Scene& scene, double seconds, double build) {
-  return scene.source.string() + ": the scene was counted, but building it and solving its first contacts takes more than the limits of a check, " + short_text(seconds) +
+  return scene.source.string() + ": the scene was counted, but building it, solving its first contacts and counting the cells of its surfaces takes more than the limits of a check, " + short_text(seconds) +
          " s of processor time and " + bytes_text(build) + " of memory; --time-limit and --memory raise them";
 }
 
 /// What is looked at here does not depend on how exact contacts are, which may take long where they are deep.
 constexpr double kContactError = 0.05;
 
-/// @param limit  of the building; what follows has limits of its own
-void build_and_look(Scene scene, const SimulationOptions& options, WorkLimit& limit, CheckReport& report) {
+constexpr double kForOutputs = 0.4;  // of the time to build a scene, beside that time
+
+/// @param limit  of the building, and with some more time of the counts of what the surfaces at the start would be drawn with
+void build_and_look(Scene scene, const SimulationOptions& options, double seconds, WorkLimit& limit, CheckReport& report) {
   scene.contact.error = std::max(contact_error(scene), kContactError);
   Simulation simulation(std::move(scene), options);
-  limit.lift();
+  limit.extend(kForOutputs * seconds);
   try {
     expect_output_sizes(simulation, requested_outputs(simulation.scene()));
   } catch (const Error& error) {
     throw Error(ErrorKind::Scene, error.faults());
   }
+  limit.lift();
   report.built = true;
   report.particles = simulation.model().particles.size();
   report.warnings = simulation.warnings();
@@ -80,7 +83,7 @@ CheckReport check_scene(const Scene& scene, SimulationOptions options, double bu
   options.interrupt = limit.interrupt();
   try {
     const InterruptScope scope(limit.interrupt());
-    build_and_look(scene, options, limit, report);
+    build_and_look(scene, options, seconds, limit, report);
   } catch (const Interrupted&) {
     if (!limit.passed()) throw;
     report.warnings.push_back(unfinished(scene, seconds, build));

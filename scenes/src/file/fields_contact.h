@@ -67,7 +67,7 @@ void fields(Archive& archive, ContactDesc& d) {
   archive("error", d.error, between(1e-10, 0.1, kNumber), "relative error of force, area and centre of pressure; absent: the accuracy, or 1e-4 where the scene fixes its steps or its method");
   archive("rule", d.rule, {}, "quadrature points of the contact surface. polar: in polar rings about the pressure peak; march: on triangles that are refined; panels: on panels cut at the boundary; auto: panels where the pressure has many maxima, polar where it fits, else march");
   archive("split", d.split, {}, "how forces reach the particles. energy: by the gradient of the contact energy; contribution: by each primitive's share of the field");
-  archive("core", d.core, {}, "soft: bodies pressed too hard pass through each other, which is reported; barrier: bodies stop approaching where the pressure exceeds half of that in the middle of the weaker one");
+  archive("core", d.core, {}, "soft: a run whose bodies are pressed through each other ends with exit code 5 and names them; barrier: bodies stop approaching where the pressure exceeds half of that in the middle of the weaker one");
   archive("friction_speed", d.friction_speed, above(0.0, kSpeed), "sliding speed below which Coulomb friction falls to zero. Where an explicit step of friction would reverse the sliding, the pair has a higher one; implicit methods have one so small that no creep shows");
   archive("stick", d.stick, {}, "friction by springs up to the Coulomb limit, so that bodies held by friction stay at rest; absent: they creep");
   archive("bulge", d.bulge, between(0.0, 1.0, kNumber), "height of the bulge beside a contact over the depth of the contact; 0: no bulge");

@@ -37,7 +37,7 @@ void WorkLimit::watch(double last_second, double last_byte, const std::atomic<in
   do {
     const int number = outer != nullptr ? outer->load() : 0;
     if (number != 0) raised_ = number;
-    if (number == 0 && !lifted_ && (process_cpu_seconds() >= last_second || resident_bytes() >= last_byte)) raised_ = kPassed;
+    if (number == 0 && !lifted_ && (process_cpu_seconds() >= last_second + more_ || resident_bytes() >= last_byte)) raised_ = kPassed;
   } while (raised_ == 0 && !left_.wait_for(lock, kBetween, [this] { return done_; }));
 }
 

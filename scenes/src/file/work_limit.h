@@ -21,6 +21,8 @@ class WorkLimit {
 
   /// For InterruptScope and SimulationOptions.
   [[nodiscard]] const std::atomic<int>* interrupt() const noexcept { return &raised_; }
+  /// Adds processor time.
+  void extend(double seconds) noexcept { more_ = seconds; }
   /// From now on other interrupts alone stop the work.
   void lift() noexcept { lifted_ = true; }
   /// Whether a limit, and no other interrupt, stopped the work.
@@ -32,6 +34,7 @@ class WorkLimit {
 
   std::atomic<int> raised_{0};
   std::atomic<bool> lifted_{false};
+  std::atomic<double> more_{0.0};  // [s]
   std::mutex mutex_;
   std::condition_variable left_;
   bool done_ = false;

@@ -17,14 +17,45 @@ std::uint32_t kind_of(const StageContext& context, std::uint32_t body) {
   return kAlike | context.bodies[body].object;
 }
 
+/// @param inverse  of the mass [1/kg]; 0: fixed bodies @return [J]
+double energy_of_approach(double speed, double inverse) { return speed > 0.0 && inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0; }
+
+/// Kinetic energy of approach [J] of the masses that the contact moves: of one particle bodies all, of others what is near.
+class MovedMasses {
+ public:
+  MovedMasses(const StageContext& context, const core::ParticleState& particles, const Frame& frame) : context_(context), particles_(particles), frame_(frame) {}
+
+  [[nodiscard]] double energy(const collision::ContactSurface::Summary& s, double speed) {
+    if (!(speed > 0.0)) return 0.0;
+    if (mobility_.empty()) find_mobility(context_, particles_, frame_, mobility_);
+    return energy_of_approach(speed, collision::approach_inverse_mass(frame_.bodies, mobility_, s));
+  }
+
+ private:
+  const StageContext& context_;
+  const core::ParticleState& particles_;
+  const Frame& frame_;
+  std::vector<collision::PartMobility> mobility_;
+};
+
+RunRecord::Overload overload_of(const StageContext& context, const collision::BodyPair& bodies, double time, double energy, double capacity) {
+  return {.a = body_name(context.model, context.bodies, bodies.a),
+          .b = body_name(context.model, context.bodies, bodies.b),
+          .time = time,
+          .energy = energy,
+          .capacity = capacity};
+}
+
+std::vector<RunRecord::Overload>::iterator entry_of(const RunRecord::Overload& found, RunRecord& record) {
+  return std::find_if(record.overloads.begin(), record.overloads.end(),
+                      [&](const RunRecord::Overload& o) { return o.a == found.a && o.b == found.b; });
+}
+
 /// Keeps when an overload began, and how hard it is at worst.
-void note(const StageContext& context, const collision::BodyPair& bodies, RunRecord::Overload found, RunRecord& record) {
-  found.a = body_name(context.model, context.bodies, bodies.a);
-  found.b = body_name(context.model, context.bodies, bodies.b);
-  const auto known = std::find_if(record.overloads.begin(), record.overloads.end(),
-                                  [&](const RunRecord::Overload& o) { return o.a == found.a && o.b == found.b; });
+void note(const RunRecord::Overload& found, RunRecord& record) {
+  const auto known = entry_of(found, record);
   if (known == record.overloads.end()) {
-    record.overloads.push_back(std::move(found));
+    record.overloads.push_back(found);
   } else if (found.energy * known->capacity > known->energy * found.capacity) {
     known->energy = found.energy;
     known->capacity = found.capacity;
@@ -73,12 +104,11 @@ collision::BodyPair OverloadWatch::kinds_of(const StageContext& context, const c
   return {a, b};
 }
 
-void OverloadWatch::look(const StageContext& context, const Frame& frame, double time, RunRecord& record) {
+std::optional<RunRecord::Overload> OverloadWatch::look(const StageContext& context, const core::ParticleState& particles, const Frame& frame, double time,
+                                                       RunRecord& record) {
   const auto& summary = frame.surface.summary;
   const auto kinetic_energy = [&](const collision::ContactSurface::Summary& s, const collision::Approach& approach) {
-    const double speed = std::max(approach.speed, 0.0);
-    const double inverse = 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b);
-    return inverse > 0.0 ? 0.5 * speed * speed / inverse : 0.0;
+    return energy_of_approach(approach.speed, 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b));
   };
   constexpr double kSafety = 0.45;  // of a coarse capacity, where half is the bound
   const auto suspicious = [&](const collision::ContactSurface::Summary& s, double kinetic, double coarse) {
@@ -98,6 +128,8 @@ void OverloadWatch::look(const StageContext& context, const Frame& frame, double
                       suspicious(s, kinetic_energy(s, collision::measure_approach(frame.bodies, s)), known->second);
     }
   });
+  std::optional<RunRecord::Overload> passing;
+  MovedMasses masses(context, particles, frame);
   for (std::size_t k = 0; k < summary.size(); ++k) {
     if (looked_at_[k] == 0) continue;
     const collision::ContactSurface::Summary& s = summary[k];
@@ -110,24 +142,37 @@ void OverloadWatch::look(const StageContext& context, const Frame& frame, double
     const double coarse = place->second;
     if (!suspicious(s, kinetic, coarse)) continue;
     const collision::ContactBody &a = frame.bodies[s.bodies.a], &b = frame.bodies[s.bodies.b];
-    if (!(kinetic + collision::shifted_energy(a, b, Vec3::Zero(), approach.normal, kCoarseCells) > kSafety * coarse)) continue;
+    const double pressed = collision::shifted_energy(a, b, Vec3::Zero(), approach.normal, kCoarseCells);
+    if (!(kinetic + pressed > kSafety * coarse)) continue;
     double& worst = worst_[s.bodies];
     constexpr int kCells = 24;
-    constexpr double kWorthMeasuring = 1.02;
-    const double energy = kinetic + collision::shifted_energy(a, b, Vec3::Zero(), approach.normal, kCells);
-    if (!(energy > kWorthMeasuring * worst)) continue;
-    worst = energy;
+    constexpr double kWorthMeasuring = 1.02, kAtRest = 0.01;  // the latter of the capacity
+    const double moving = pressed > kSafety * coarse ? masses.energy(s, approach.speed) : 0.0;
+    const bool may_pass = moving > kAtRest * coarse && pressed + moving > 2.0 * kSafety * coarse;
+    const double contact = collision::shifted_energy(a, b, Vec3::Zero(), approach.normal, kCells), energy = kinetic + contact;
+    if (!may_pass && !(energy > kWorthMeasuring * worst)) continue;
+    worst = std::max(worst, energy);
     const double capacity = collision::contact_capacity(a, b, approach.normal, kCells);
-    if (energy > 0.5 * capacity) note(context, s.bodies, {.a = {}, .b = {}, .time = time, .energy = energy, .capacity = capacity}, record);
+    if (!(energy > 0.5 * capacity)) continue;
+    const RunRecord::Overload found = overload_of(context, s.bodies, time, energy, capacity);
+    note(found, record);
+    if (!passing && may_pass && contact > 0.5 * capacity && contact + moving > capacity) passing = found;
   }
+  return passing;
 }
 
-void OverloadWatch::look_within(const StageContext& context, const Frame& frame, double time, RunRecord& record) {
+std::optional<RunRecord::Overload> OverloadWatch::look_within(const StageContext& context, const Frame& frame, double time, RunRecord& record) {
+  std::optional<RunRecord::Overload> passing;
   for (const collision::ContactSurface::Summary& s : frame.surface.summary) {
     if (s.reason != collision::RuleReason::Within) continue;
     // A pair with one body entirely inside the other has reached its capacity.
-    note(context, s.bodies, {.a = {}, .b = {}, .time = time, .energy = s.energy, .capacity = s.energy}, record);
+    const RunRecord::Overload found = overload_of(context, s.bodies, time, s.energy, s.energy);
+    const auto known = entry_of(found, record);
+    const bool began_so = known == record.overloads.end() || known->energy == known->capacity;
+    note(found, record);
+    if (!passing && !began_so) passing = found;
   }
+  return passing;
 }
 
 bool hold_cores(const StageContext& context, Frame& frame, core::ParticleState& particles, core::Ledger& ledger,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "simulation/frame.h"
@@ -11,12 +12,16 @@
 namespace supple::scenes {
 
 /// Checks every pair in contact. A pair is overloaded when the kinetic energy of its approach (with the masses of the
-/// whole bodies) and its contact energy exceed half of its capacity (`collision::contact_capacity`).
+/// whole bodies) and its contact energy exceed half of its capacity (`collision::contact_capacity`). Its bodies pass through each other when its contact
+/// energy alone exceeds half of the capacity and, with the kinetic energy of the masses that the contact moves (`collision::approach_inverse_mass`), all of it.
 class OverloadWatch {
  public:
-  void look(const StageContext& context, const Frame& frame, double time, RunRecord& record);
-  /// The same for bodies that lie entirely inside others: their pairs have an energy, but no force. @param frame  with energies
-  static void look_within(const StageContext& context, const Frame& frame, double time, RunRecord& record);
+  /// @return the first pair that passes
+  std::optional<RunRecord::Overload> look(const StageContext& context, const core::ParticleState& particles, const Frame& frame, double time,
+                                          RunRecord& record);
+  /// The same for bodies that lie entirely inside others: their pairs have an energy, but no force. They pass if they were overloaded before; those that are
+  /// found so began so, and are recorded. @param frame  with energies
+  static std::optional<RunRecord::Overload> look_within(const StageContext& context, const Frame& frame, double time, RunRecord& record);
   /// Renumbers the bodies.
   void forget();
 

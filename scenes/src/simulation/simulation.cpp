@@ -118,8 +118,9 @@ void Simulation::Impl::step() {
   step_was_long = std::chrono::steady_clock::now() - started > kLongStep;
   if (state.substep == 0) {
     const double before = process_cpu_seconds();
-    book_audits();
+    const std::optional<RunRecord::Overload> passing = book_audits();
     p.apart_s += process_cpu_seconds() - before;
+    if (passing && scene.contact.core == CoreName::Soft) throw_passing(*passing);
     check_energy();
   }
   p.scale();

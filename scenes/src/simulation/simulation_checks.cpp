@@ -58,7 +58,7 @@ const Frame& Simulation::Impl::seen_contacts(const StageContext& quiet) {
   return pulled;
 }
 
-/// At the end of a step: overloaded pairs are recorded, and pushed back with contact.core: barrier.
+/// At the end of a step: overloaded pairs are recorded, and pushed back with contact.core: barrier. @throws Error{Diverged} where bodies pass through each other
 void Simulation::Impl::watch_pressing() {
   if (!contact_on()) return;
   add_unresolved(context(), scene.contact.rule, frame.surface, warnings);
@@ -69,7 +69,8 @@ void Simulation::Impl::watch_pressing() {
     std::vector<implicit::SampleState> trial = state.samples;
     find_contact_surface(context(), state.particles, trial, frame, false);
   }
-  watch.look(context(), frame, time(), state.record);
+  const std::optional<RunRecord::Overload> passing = watch.look(context(), state.particles, frame, time(), state.record);
+  if (passing && !barrier) throw_passing(*passing);
   if (barrier && hold_cores(context(), frame, state.particles, state.ledger, state.record)) state.kick.valid = false;
 }
 
@@ -135,6 +136,22 @@ void Simulation::Impl::throw_too_coarse(const TooCoarse& found) {
                           .hint = "set substeps to auto" +
                                   (refused ? ", and max_substeps at least " + number_text(substeps) : std::string())});
   if (last_frame.record.valid) take(last_frame);
+  throw error;
+}
+
+/// With the last frame as the state, which keeps what is known of overloads.
+void Simulation::Impl::throw_passing(const RunRecord::Overload& found) {
+  const Error error(ErrorKind::Diverged,
+                    Fault{.place = scene.source.string(),
+                          .key = {},
+                          .expected = "overloaded at step " + std::to_string(state.steps) + " (t = " + short_text(found.time) + " s): '" + found.a +
+                                      "' and '" + found.b + "' pass through each other; their contact holds at most " + short_text(found.capacity) + " J",
+                          .found = short_text(found.energy) + " J of approach and contact",
+                          .hint = "raise the modulus of the softer one, lower masses, speeds or loads, or set contact.core to barrier"});
+  drop_results();
+  std::vector<RunRecord::Overload> overloads = std::move(state.record.overloads);
+  if (last_frame.record.valid) take(last_frame);
+  state.record.overloads = std::move(overloads);
   throw error;
 }
 

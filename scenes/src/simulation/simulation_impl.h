@@ -130,6 +130,7 @@ struct Simulation::Impl {
   void check_energy();
   void check_divergence();
   [[noreturn]] void throw_too_coarse(const TooCoarse& found);
+  [[noreturn]] void throw_passing(const RunRecord::Overload& found);
   [[noreturn]] void throw_diverged(const core::Divergence& divergence, std::uint64_t step_number, double at) const;
   /// For evaluations that are not part of a step.
   StageContext quiet_context(Profile& unused) {
@@ -150,7 +151,7 @@ struct Simulation::Impl {
   Energies energies();
   /// Of the state within a step, at a time of it; leaves the contacts there in `pulled`. Without springs of friction, which implicit steps do not have.
   Energies energies_within(double at);
-  void book_audits();
+  std::optional<RunRecord::Overload> book_audits();
 };
 
 }  // namespace supple::scenes

@@ -132,10 +132,11 @@ Energies Simulation::Impl::energies_within(double at) {
   return e;
 }
 
-void Simulation::Impl::book_audits() {
+/// @return the first pair that has passed into each other wholly
+std::optional<RunRecord::Overload> Simulation::Impl::book_audits() {
   const double energy = energies().total();  // and the contacts
   scenes::book_audits(model, bodies, energy, pulled.surface, state);
-  OverloadWatch::look_within(context(), pulled, time(), state.record);
+  return OverloadWatch::look_within(context(), pulled, time(), state.record);
 }
 
 }  // namespace supple::scenes
