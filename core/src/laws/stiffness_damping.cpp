@@ -9,8 +9,8 @@
 namespace supple::core {
 namespace {
 
-using Mat6 = Eigen::Matrix<double, 6, 6>;
-using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Vec12 = Eigen::Matrix<double, 12, 1>;
 
 /// The damping time of a pair, 0 unless both are of one object that has one.
@@ -34,20 +34,20 @@ class Deformation {
       : r_(r), share_(0.4 * Mat3::Identity() + 0.1 / r.squaredNorm() * r * r.transpose()), turn_(-0.5 / r.squaredNorm() * cross_matrix(r)) {}
 
   /// N^T K N
-  [[nodiscard]] Mat6 stiffness(const PairHessian& k) const {
+  [[nodiscard]] Matrix6 stiffness(const PairHessian& k) const {
     Eigen::Matrix<double, 12, 6> columns;
     columns.leftCols<3>() = k.middleCols<3>(6) - k.middleCols<3>(0) + (k.middleCols<3>(3) + k.middleCols<3>(9)).lazyProduct(turn_);
     columns.rightCols<3>() = k.middleCols<3>(9) - k.middleCols<3>(3);
-    Mat6 out;
+    Matrix6 out;
     out.topRows<3>() = columns.middleRows<3>(6) - columns.middleRows<3>(0) + turn_.transpose().lazyProduct(columns.middleRows<3>(3) + columns.middleRows<3>(9));
     out.bottomRows<3>() = columns.middleRows<3>(9) - columns.middleRows<3>(3);
     return out;
   }
   /// B^T s
-  [[nodiscard]] Vec6 of(const Vec12& s) const {
-    const Vec3 apart = s.segment<3>(6) - s.segment<3>(0), turned = s.segment<3>(3) + s.segment<3>(9);
-    Vec6 q;
-    q.head<3>() = share_ * apart + 0.2 * r_.cross(turned);
+  [[nodiscard]] Vector6 of(const Vec12& s) const {
+    const Vec3 apart = s.segment<3>(6) - s.segment<3>(0), turns = s.segment<3>(3) + s.segment<3>(9);
+    Vector6 q;
+    q.head<3>() = share_ * apart + 0.2 * r_.cross(turns);
     q.tail<3>() = 0.5 * (s.segment<3>(9) - s.segment<3>(3));
     return q;
   }
@@ -141,16 +141,16 @@ void damp(const ParticleSet& set, const DampedPair& pair, double h, ParticleStat
   const auto& [a, b, hessian] = pair;
   const Vec3 r = state.position[b] - state.position[a];
   const Deformation deformation(r);
-  const Mat6 k = h * deformation.stiffness(hessian);
-  const Eigen::Matrix<double, 12, 6> loads = deformation.loads<6>(Mat6::Identity());
-  const Mat6 mobility = loads.transpose().lazyProduct(moved_by(set, state, a, b, loads));
+  const Matrix6 k = h * deformation.stiffness(hessian);
+  const Eigen::Matrix<double, 12, 6> loads = deformation.loads<6>(Matrix6::Identity());
+  const Matrix6 mobility = loads.transpose().lazyProduct(moved_by(set, state, a, b, loads));
   const Vec12 motion = velocities(set, state, a, b), led = led_velocities(set, motion, a, b);
-  const Vec6 before = deformation.of(motion - led), prescribed = deformation.of(led);
-  const Mat6 z = mobility.lazyProduct(k);
+  const Vector6 before = deformation.of(motion - led), prescribed = deformation.of(led);
+  const Matrix6 z = mobility.lazyProduct(k);
   // Of what is prescribed the mean has (exp(-A) - 1 + A) / A^2.
-  const Vec6 drive = before + 0.5 * z * (before - prescribed - z * prescribed);
-  const Vec6 mean = (Mat6::Identity() + z + 0.5 * z.lazyProduct(z)).partialPivLu().solve(drive);
-  const Vec6 impulse = -k * (mean + prescribed);
+  const Vector6 drive = before + 0.5 * z * (before - prescribed - z * prescribed);
+  const Vector6 mean = (Matrix6::Identity() + z + 0.5 * z.lazyProduct(z)).partialPivLu().solve(drive);
+  const Vector6 impulse = -k * (mean + prescribed);
   const Balanced balanced = balance(r, deformation.loads<1>(impulse));
   apply_impulse(set, a, -balanced.force_b, balanced.torque_a, state, ledger);
   apply_impulse(set, b, balanced.force_b, balanced.torque_b, state, ledger);
