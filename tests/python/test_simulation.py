@@ -109,7 +109,8 @@ class Simulations(unittest.TestCase):
     def test_tell_what_deforms_and_what_is_overloaded(self):
         simulation = supple.Simulation(two_drops({"objects.left.particles.velocity": [30, 0, 0]}))
         self.assertEqual((simulation.overloads(), simulation.shape_errors()), ([], {"left": (0, 0), "right": (0, 0)}))
-        simulation.advance_to(3)
+        with self.assertRaisesRegex(supple.Error, "'left' and 'right' pass through each other"):
+            simulation.advance_to(3)
         overload, = simulation.overloads()
         self.assertEqual((overload["a"], overload["b"]), ("left", "right"))
         self.assertGreater(overload["energy"], overload["capacity"] / 2)
