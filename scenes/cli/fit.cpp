@@ -56,6 +56,9 @@ void add_fit_options(CLI::App& verb, FitArguments& a) {
       ->check([](const std::string& text) { return share_in(text) ? std::string() : "expected a share such as 1% or 0.01, found " + text; });
   verb.add_option("--particles", a.particles, "number of particles (default: 200)");
   verb.add_option("--primitives", a.primitives, "largest number of primitives of the skeleton (default: 2000)");
+  verb.add_option("--kind", a.kind, "solid (default), or shell: a layer about a surface, which may be open")->check(CLI::IsMember({"solid", "shell"}));
+  verb.add_option("--thickness", a.thickness, "of a shell [m] (default: a third of the distance between particles)");
+  verb.add_option("--material", a.material, "of the object: the name of a material of supple:materials (jelly, rubber ...), or a file of scenes with the key 'material'");
   verb.add_option("--pieces", a.pieces, "data of several pieces: refuse (default) or largest")->check(CLI::IsMember({"refuse", "largest"}));
   verb.add_option("--iso", a.iso, "of a volume: values above lie inside");
   verb.add_option_function<std::string>("--window", [&a](const std::string& text) { a.window = window_in(text); }, "of a volume: values FROM:TO lie inside")

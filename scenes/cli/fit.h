@@ -12,7 +12,8 @@
 namespace supple::tool {
 
 struct FitArguments {
-  std::string input, out, picture;
+  std::string input, out, picture, material, kind = "solid";
+  std::optional<double> thickness;
   std::string pieces = "refuse";
   double error = 0.01;           ///< over the diagonal
   std::uint32_t particles = 200, primitives = 2000;

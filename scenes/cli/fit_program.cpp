@@ -1,6 +1,7 @@
 /// The program `supple_fit`, which `supple fit` starts with its own options.
 #include <filesystem>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "fit.h"
@@ -10,6 +11,7 @@
 #include "supple/core/error.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/fit/fit.h"
+#include "supple/scenes/read_scene.h"
 
 namespace {
 
@@ -17,9 +19,24 @@ using namespace supple;
 using tool::print;
 namespace fs = std::filesystem;
 
+/// The material of a file of scenes, or a shipped one by its name: read like that of an object.
+fit::Substance material_of(const std::string& given) {
+  if (given.empty()) return {};
+  const fs::path file = given;
+  const bool named = !file.has_extension() && !file.has_parent_path();
+  const auto quoted = [](const std::string& text) { return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace); };
+  const std::string text = std::string("schema: 1\nduration: 1\n") + (named ? "include: supple:materials\n" : "") + "objects:\n  - " +
+                           (named ? "material: " + quoted(given) : "include: " + quoted(file.filename().string())) +
+                           "\n    name: fitted\n    particles: {arrange: single}\n    skeleton: [{shape: point, kernel: {radius: 1}}]\n";
+  const scenes::Scene scene = scenes::parse_scene(text, "--material " + given, file.has_parent_path() ? file.parent_path() : fs::path("."));
+  const auto& found = scene.objects.front().material;
+  if (!found) throw Error(ErrorKind::Scene, Fault{.place = given, .key = "material", .expected = "expected the key 'material'", .found = "none", .hint = "write material: {youngs_modulus: 20 kPa, density: 1050 kg/m^3}"});
+  return {.youngs_modulus = found->youngs_modulus, .density = found->density, .poissons_ratio = found->poissons_ratio, .damping_ratio = found->damping_ratio, .friction = found->friction};
+}
+
 int make_object(const tool::FitArguments& a) {
   const fs::path out = a.out, report = fs::path(a.out).replace_extension(".json");
-  if (out.extension() != ".yaml") throw Error(ErrorKind::Usage, Fault{.place = "--out", .key = {}, .expected = "expected a file name that ends in .yaml", .found = '\'' + a.out + '\'', .hint = {}});
+  if (out.extension() != ".yaml" && out.extension() != ".yml") throw Error(ErrorKind::Usage, Fault{.place = "--out", .key = {}, .expected = "expected a file name that ends in .yaml or .yml", .found = '\'' + a.out + '\'', .hint = {}});
   const fs::path picture = a.picture;
   if (!a.picture.empty() && picture.extension() != ".png") {
     throw Error(ErrorKind::Usage, Fault{.place = "--picture", .key = {}, .expected = "expected a file name that ends in .png", .found = '\'' + a.picture + '\'', .hint = {}});
@@ -31,7 +48,10 @@ int make_object(const tool::FitArguments& a) {
                                                       .particles = a.particles,
                                                       .primitives = a.primitives,
                                                       .pieces = a.pieces == "largest" ? fit::Pieces::Largest : fit::Pieces::Refuse,
+                                                      .kind = a.kind == "shell" ? fit::Kind::Shell : fit::Kind::Solid,
+                                                      .thickness = a.thickness,
                                                       .volume = {.iso = a.iso, .window = a.window, .label = a.label},
+                                                      .material = material_of(a.material),
                                                       .threads = a.threads});
   if (!a.picture.empty()) tool::draw_fit(object, a.error, picture);
   io::write_atomically(report, fit::report_json(object.report));

@@ -5,7 +5,7 @@ import pathlib
 from supple import _tool
 
 
-def fit(data, out, *, error=0.01, particles=200, primitives=2000, pieces="refuse", iso=None, window=None, label=None, picture=None, overwrite=False, threads=0):
+def fit(data, out, *, error=0.01, particles=200, primitives=2000, pieces="refuse", iso=None, window=None, label=None, material=None, kind="solid", thickness=None, picture=None, overwrite=False, threads=0):
     """Makes an object for scenes from a mesh, points or a volume, as `supple fit` does. Returns its report, a dict with distances, numbers and warnings.
 
     data        file of a mesh (PLY, OBJ, OFF, STL) or of points (XYZ, PLY) [m], or of a volume (NIfTI, NRRD, MetaImage, OpenVDB)
@@ -17,13 +17,16 @@ def fit(data, out, *, error=0.01, particles=200, primitives=2000, pieces="refuse
     iso         of a volume: values above lie inside
     window      of a volume: values between two, a pair, lie inside
     label       of a volume: voxels of this number lie inside
+    material    name of a shipped material ("jelly", "rubber" ...), or a file of scenes with the key 'material'
+    kind        "solid", or "shell": a layer about a surface, which may be open
+    thickness   of a shell [m]; None: a third of the distance between particles
     picture     file of a picture (.png) of data and fit side by side, with their distances as colours
     overwrite   whether an earlier object is replaced
     threads     number of threads, 0 for all; does not change the result
 
     Raises Error for data that cannot be fitted.
     """
-    words = ["fit", data, "--out", out, "--error", repr(float(error)), "--particles", int(particles), "--primitives", int(primitives), "--pieces", pieces, "--threads", int(threads), "--quiet"]
+    words = ["fit", data, "--out", out, "--error", repr(float(error)), "--particles", int(particles), "--primitives", int(primitives), "--pieces", pieces, "--kind", kind, "--threads", int(threads), "--quiet"]
     # Each one word, as values may begin with a minus sign.
     if iso is not None:
         words.append(f"--iso={float(iso)!r}")
@@ -31,6 +34,10 @@ def fit(data, out, *, error=0.01, particles=200, primitives=2000, pieces="refuse
         words.append("--window=" + ":".join(repr(float(value)) for value in window))
     if label is not None:
         words.append(f"--label={int(label)}")
+    if material is not None:
+        words += ["--material", material]
+    if thickness is not None:
+        words += ["--thickness", repr(float(thickness))]
     if picture is not None:
         words += ["--picture", picture]
     _tool.call(*words, *(["--overwrite"] if overwrite else []))

@@ -16,7 +16,7 @@
 
 namespace supple::scenes {
 
-enum class FieldType : std::uint8_t { Number, Whole, Boolean, Text, Choice, Choices, Vector, Vectors, Wholes, Texts, Mapping, Mappings };
+enum class FieldType : std::uint8_t { Number, Whole, Boolean, Text, Choice, Choices, Vector, Vectors, Numbers, Wholes, Texts, Mapping, Mappings };
 
 class FieldArchive;
 
@@ -103,6 +103,8 @@ void describe_list(MemberType& out) {
   using One = typename Value::value_type;
   if constexpr (std::same_as<One, Vec3>) {
     out.type = FieldType::Vectors;
+  } else if constexpr (std::same_as<One, double>) {
+    out.type = FieldType::Numbers;
   } else if constexpr (std::same_as<One, int>) {
     out.type = FieldType::Wholes;
   } else if constexpr (std::same_as<One, std::string>) {

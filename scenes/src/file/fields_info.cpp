@@ -49,6 +49,7 @@ std::string default_of(const Member& member, const Rule& rule) {
     }
     case FieldType::Vector: return bracketed(std::span(member.as<Vec3>().data(), std::min<std::size_t>(rule.most_items, 3)), number_text);
     case FieldType::Wholes: return bracketed(member.as<std::vector<int>>(), [](int v) { return std::to_string(v); });
+    case FieldType::Numbers: return bracketed(member.as<std::vector<double>>(), number_text);
     case FieldType::Vectors:
     case FieldType::Texts:
     case FieldType::Mapping:
@@ -116,8 +117,9 @@ std::string expectation(FieldType type, std::span<const std::string_view> choice
                             : "a list of " + count_text(rule, 3, 3) + ", each " + rule_text(rule, false);
     case FieldType::Vectors:
       return "a list of " + count_text(rule, 0, kUnlimited) + " points, each a list of 3, each " + rule_text(rule, false);
+    case FieldType::Numbers:
     case FieldType::Wholes:
-      return (rule.least_items != 0 ? "a list of " + count_text(rule, 0, kUnlimited) : std::string("a list")) + ", each " + rule_text(rule, true);
+      return (rule.least_items != 0 ? "a list of " + count_text(rule, 0, kUnlimited) : std::string("a list")) + ", each " + rule_text(rule, type == FieldType::Wholes);
     case FieldType::Texts: return std::to_string(rule.least_items) + " names";
     case FieldType::Mapping: return "a mapping";
     case FieldType::Mappings: return "a list of mappings";

@@ -16,10 +16,22 @@ namespace supple::scenes {
 
 inline constexpr double kMostCount = 1e6;
 
-/// Checks that bonds join two particles each.
+/// Checks that a list is empty or has an item for each of something.
+template <class Archive>
+void check_length(Archive& archive, const char* key, std::size_t found, std::size_t wanted, const std::string& what) {
+  archive.check(!archive.sound(key) || found == 0 || found == wanted, key, "expected " + what + ": " + std::to_string(wanted), std::to_string(found), "");
+}
+
+/// Checks that bonds join two particles each, and the lists beside them.
 template <class Archive>
 void check_bonds(Archive& archive, const ParticlesDesc& d) {
   if (!archive.sound("points") || !archive.sound("bonds")) return;
+  check_length(archive, "sections", d.sections.size(), d.bonds.size() / 2, "one for each bond");
+  check_length(archive, "normals", d.normals.size(), d.points.size(), "one for each particle");
+  check_length(archive, "directions", d.directions.size(), d.normals.size(), "one for each normal");
+  check_length(archive, "curvatures", d.curvatures.size(), 2 * d.normals.size(), "two for each normal");
+  archive.check(d.normals.empty() || (!d.directions.empty() && !d.curvatures.empty() && !d.sections.empty() && d.thickness > 0.0), "normals",
+                "expected 'directions', 'curvatures', 'thickness' and 'sections' beside them", "less", "");
   archive.check(d.bonds.size() % 2 == 0, "bonds", "expected an even number of particles, two for each bond", std::to_string(d.bonds.size()), "");
   for (std::size_t k = 0; k < d.bonds.size(); ++k) {
     const std::string key = "bonds[" + std::to_string(k) + ']';
@@ -50,6 +62,11 @@ void fields(Archive& archive, ParticlesDesc& d) {
   archive.required("points", d.points, only(any(kLength).items(2, 10000), {Curve}), "points through which a smooth curve passes (Catmull-Rom); particles lie on it at equal distances, their x along it");
   archive.required("points", d.points, only(any(kLength).items(1, 10000), {Points}), "places of the particles");
   archive("bonds", d.bonds, only(between(0.0, kMostCount, kNumber), {Points}), "numbers of particles, from 0, that a material joins: the first to the second, the third to the fourth and so on");
+  archive("sections", d.sections, only(above(0.0, kArea), {Points}), "area of the section of each bond, as `supple fit` finds them; absent: all equal");
+  archive("normals", d.normals, only(direction(), {Points}), "of a shell: one for each particle, outward; absent: the particles fill a solid");
+  archive("directions", d.directions, only(direction(), {Points}), "of a shell: x of each particle's frame, in which its first principal curvature is measured");
+  archive("thickness", d.thickness, only(above(0.0, kLength), {Points}), "of a shell, from which it bends");
+  archive("curvatures", d.curvatures, only(any(kSlope), {Points}), "of a shell: both principal curvatures of each particle one after the other, > 0 where it bulges along the normal; they are the rest shape of directed_form");
   archive.required("size", d.size, only(above(0.0, kLength), {Scatter}), "edges of the box, about its middle, in which particles lie at random");
   archive("seed", d.seed, only(between(0.0, 1e9, kNumber), {Scatter}), "another seed gives other places");
   archive.required("file", d.file, only(file_name(), {File, Fill}),

@@ -128,6 +128,7 @@ Json value_schema(const FieldInfo& info) {
       const Json point = list_schema(number_schema(info.rule, false), {}, 3, 3);
       return list_schema(point, info.rule, 0, kAny);
     }
+    case FieldType::Numbers: return list_schema(number_schema(info.rule, false), info.rule, 0, kAny);
     case FieldType::Wholes: return list_schema(number_schema(info.rule, true), info.rule, 0, kAny);
     case FieldType::Texts: return list_schema({{"type", "string"}}, info.rule, 0, kAny);
     case FieldType::Mapping: {

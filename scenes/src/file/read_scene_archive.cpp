@@ -159,6 +159,7 @@ void ReadArchive::read(const Node& node, const std::string& path, const Member& 
     case FieldType::Vector: return read_one<Vec3>(node, path, member, rule);
     case FieldType::Text: return read(node, path, member.as<std::string>(), rule);
     case FieldType::Vectors: return read(node, path, member.as<std::vector<Vec3>>(), rule);
+    case FieldType::Numbers: return read(node, path, member.as<std::vector<double>>(), rule);
     case FieldType::Wholes: return read(node, path, member.as<std::vector<int>>(), rule);
     case FieldType::Texts: return read(node, path, member.as<std::vector<std::string>>(), rule);
     case FieldType::Choice:
@@ -400,6 +401,14 @@ void ReadArchive::read(const Node& node, const std::string& path, std::vector<Ve
   const Rule each = rule.items(3, 3);
   for (std::size_t i = 0; i < node.items.size(); ++i) {
     read(*node.items[i], path + '[' + std::to_string(i) + ']', value[i], each);
+  }
+}
+
+void ReadArchive::read(const Node& node, const std::string& path, std::vector<double>& value, const Rule& rule) {
+  if (!read_items(node, path, rule, "numbers")) return;
+  value.assign(node.items.size(), 0.0);
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    read(*node.items[i], path + '[' + std::to_string(i) + ']', value[i], rule);
   }
 }
 

@@ -48,6 +48,7 @@ class ReadArchive final : public FieldArchive {
   void read(const Node& node, const std::string& path, std::string& value, const Rule& rule);
   void read(const Node& node, const std::string& path, Vec3& value, const Rule& rule);
   void read(const Node& node, const std::string& path, std::vector<Vec3>& value, const Rule& rule);
+  void read(const Node& node, const std::string& path, std::vector<double>& value, const Rule& rule);
   void read(const Node& node, const std::string& path, std::vector<int>& value, const Rule& rule);
   void read(const Node& node, const std::string& path, std::vector<std::string>& value, const Rule& rule);
   [[nodiscard]] bool read_items(const Node& node, const std::string& path, const Rule& rule, std::string_view noun);

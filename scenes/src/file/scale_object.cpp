@@ -8,8 +8,10 @@ void scale(std::optional<double>& length, double by) {
 }
 
 void scale(ParticlesDesc& d, double by) {
-  for (double* length : {&d.radius, &d.inner_radius, &d.outer_radius, &d.spacing, &d.disorder, &d.length}) *length *= by;
+  for (double* length : {&d.radius, &d.inner_radius, &d.outer_radius, &d.spacing, &d.disorder, &d.length, &d.thickness}) *length *= by;
   for (Vec3& p : d.points) p *= by;
+  for (double& area : d.sections) area *= by * by;
+  for (double& curvature : d.curvatures) curvature /= by;
   d.size *= by;
   d.inertia_axes *= by;
   scale(d.inertia_radius, by);

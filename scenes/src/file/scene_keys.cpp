@@ -104,6 +104,7 @@ std::string member_text(const Member& member, const Rule& rule) {
     case FieldType::Vector: return one_text<Vec3>(member, rule);
     case FieldType::Text: return value_text(member.as<std::string>(), rule);
     case FieldType::Vectors: return value_text(member.as<std::vector<Vec3>>(), rule);
+    case FieldType::Numbers: return value_text(member.as<std::vector<double>>(), rule);
     case FieldType::Wholes: return value_text(member.as<std::vector<int>>(), rule);
     case FieldType::Texts: return value_text(member.as<std::vector<std::string>>(), rule);
     case FieldType::Choice: return std::string(type.choices[type.chosen(member.at)]);

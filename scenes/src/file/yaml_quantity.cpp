@@ -310,7 +310,7 @@ std::string_view noun_of(const Dimension& dimension) {
   if (dimension == kTorque.dimension) return "energy or torque";
   for (const Quantity& q : {kNumber, kLength, kMass, kTime, kRate, kAngle, kSpeed, kSpin, kAcceleration, kForce,
                             kPressure, kStiffness, kDamping, kAngularDamping, kSlope, kInverseArea, kInverseSpeed,
-                            kVolume}) {
+                            kArea, kVolume}) {
     if (q.dimension == dimension) return q.noun;
   }
   return "";

@@ -52,6 +52,7 @@ inline constexpr Quantity kBending{"bending strength", "J m^2", {4, 1, -2, 0}};
 inline constexpr Quantity kDamping{"damping", "N s/m", {0, 1, -1, 0}};
 inline constexpr Quantity kAngularDamping{"angular damping", "N m s", {2, 1, -1, 0}};
 inline constexpr Quantity kSlope{"slope", "1/m", {-1, 0, 0, 0}};
+inline constexpr Quantity kArea{"area", "m^2", {2, 0, 0, 0}};
 inline constexpr Quantity kVolume{"volume", "m^3", {3, 0, 0, 0}};
 inline constexpr Quantity kDensity{"density", "kg/m^3", {-3, 1, 0, 0}};
 inline constexpr Quantity kInverseArea{"inverse area", "1/m^2", {-2, 0, 0, 0}};

@@ -11,6 +11,8 @@
 #include "fit/data.h"
 #include "fit/measure.h"
 #include "fit/packing.h"
+#include "fit/sections.h"
+#include "fit/shell.h"
 #include "fit/solve.h"
 #include "supple/core/counted.h"
 #include "supple/core/error.h"
@@ -33,6 +35,11 @@ void check(const FitOptions& options) {
   const auto& window = options.volume.window;
   expect_range("--window", !window || (*window)[0] < (*window)[1], "expected two values, the smaller one first",
                window ? short_number((*window)[0]) + ':' + short_number((*window)[1]) : "");
+  const Substance& material = options.material;
+  const bool possible = material.youngs_modulus > 0.0 && material.density > 0.0 && material.poissons_ratio >= 0.0 && material.poissons_ratio <= 0.25 && material.damping_ratio >= 0.0 &&
+                        material.damping_ratio <= 1.0 && material.friction >= 0.0;
+  expect_range("--material", possible, "expected a modulus and a density > 0, Poisson's ratio from 0 to 0.25, a damping ratio from 0 to 1 and a friction >= 0", "others");
+  expect_range("--thickness", !options.thickness || *options.thickness > 0.0, "expected a length > 0 [m]", options.thickness ? short_number(*options.thickness) : "");
   expect_range("--primitives", options.primitives >= 1 && options.primitives <= 10000, "expected a whole number from 1 to 10000", std::to_string(options.primitives));
 }
 
@@ -58,7 +65,7 @@ long genus_of(const MeshReport& mesh) { return static_cast<long>(mesh.components
 /// Samples, distances and the balls that touch the surface; all lengths over the diagonal.
 struct Data {
   Data(const Mesh& given, double most, double error, const Executor& executor)
-      : mesh(given), tree(given), surface(sample_surface(given, kSamples)), points(surface.position), largest_ball(most), genus(genus_of(inspect(given))) {
+      : mesh(given), tree(given), surface(sample_surface(given, kSamples)), points(surface.position), largest_ball(most), genus(genus_of(inspect(given))), pieces(inspect(given).components) {
     constexpr double kStep = 1.0 / 48.0;
     around = sample_surroundings(mesh, tree, kStep, executor);
     constexpr double kSlack = 0.2, kBeforeHollow = 2.0;  // balls larger than a hollow blend across it
@@ -75,6 +82,7 @@ struct Data {
   std::vector<double> radius;  ///< of the largest ball at a sample, from inside and with respect to hollows outside
   double largest_ball;
   long genus;
+  std::size_t pieces;  ///< two for a closed shell
 };
 
 Targets targets_of(const Data& data) {
@@ -101,7 +109,7 @@ struct Faults {
   std::vector<std::uint32_t> missed;  ///< samples of the data outside the fit
   std::vector<Vec3> inside, outside;  ///< points of the fitted surface inside and outside the data
   double largest = 0.0;
-  bool topology = false;              ///< the fitted surface has one piece, and as many handles as the data
+  bool topology = false;              ///< the fitted surface has as many pieces and handles as the data
 };
 
 /// Vertices of all pieces of a mesh but the largest.
@@ -142,7 +150,7 @@ Faults find_faults(const Data& data, const implicit::Field& field, double cell, 
     if (of_data[k] > most && value[k] < 0.0) out.missed.push_back(k);
   }
   const MeshReport report = inspect(mesh);
-  out.topology = report.components == 1 && genus_of(report) == data.genus;
+  out.topology = report.components == data.pieces && genus_of(report) == data.genus;
   const std::vector<char> small = on_small_pieces(mesh);
   const double apart = 0.5 * most;
   std::vector<Vec3> kept;
@@ -291,13 +299,42 @@ void warn_of_source(FitReport& report) {
 }
 
 /// Primitives hang on the particle whose share they lie in.
-void hang(FittedObject& object, const Skeleton& skeleton, const Packing& packing, const Surroundings& around, const Frame& frame) {
-  const PointTree tree(around.inside);
+/// @param points  of which the particles have shares
+void hang(FittedObject& object, const Skeleton& skeleton, const Packing& packing, const std::vector<Vec3>& points, double diagonal) {
+  const PointTree tree(points);
   for (const Blob& blob : skeleton.blobs) {
     const std::uint32_t particle = packing.share[tree.nearest(blob.centre)];
-    object.primitives.push_back({particle, frame.diagonal * (blob.centre - packing.particle[particle]), frame.diagonal * blob.axes, blob.turn});
+    Quat frame = Quat::Identity();
+    if (!object.frames.empty()) {
+      const FittedFrame& f = object.frames[particle];
+      Mat3 axes;
+      axes << f.direction, f.normal.cross(f.direction), f.normal;
+      frame = Quat(axes);
+    }
+    object.primitives.push_back({particle, diagonal * (frame.inverse() * (blob.centre - packing.particle[particle])), diagonal * blob.axes, frame.inverse() * blob.turn});
   }
   std::stable_sort(object.primitives.begin(), object.primitives.end(), [](const auto& a, const auto& b) { return a.particle < b.particle; });
+}
+
+/// Particles, bonds and their sections of a solid; lengths over the diagonal.
+Packing add_solid(FittedObject& object, const Skeleton& skeleton, const Data& data, const FitOptions& options, const Executor& executor) {
+  constexpr double kPointsOfShare = 40.0, kLeastPoints = 20000.0;
+  const double points = std::max(kPointsOfShare * options.particles, kLeastPoints), volume = inspect(data.mesh).volume, diagonal = object.report.diagonal;
+  const Surroundings lattice = sample_surroundings(data.mesh, data.tree, math::pow(volume / points, 1.0 / 3.0), executor);
+  Packing packing = pack_inside(lattice, options.particles, executor);
+  for (const double area : bond_sections(packing, options.material.poissons_ratio)) object.sections.push_back(diagonal * diagonal * area);
+  hang(object, skeleton, packing, lattice.inside, diagonal);
+  return packing;
+}
+
+/// The same of a shell about a surface, with its frames.
+Packing add_shell(FittedObject& object, const Skeleton& skeleton, const Mesh& middle, const FitOptions& options, const Executor& executor) {
+  ShellElements shell = pack_shell(middle, options.particles, executor);
+  const double diagonal = object.report.diagonal;
+  for (const SurfaceFrame& f : shell.frame) object.frames.push_back({f.normal, f.direction, f.first / diagonal, f.second / diagonal});
+  for (const Face& edge : shell.packing.face) object.sections.push_back(diagonal * edge.area.norm() * object.thickness);
+  hang(object, skeleton, shell.packing, shell.samples.position, diagonal);
+  return std::move(shell.packing);
 }
 
 void report_errors(FittedObject& object, const Data& data, const Skeleton& skeleton, const FitOptions& options, const Executor& executor) {
@@ -324,22 +361,41 @@ void report_errors(FittedObject& object, const Data& data, const Skeleton& skele
                   options.primitives);
     report.warnings.emplace_back(text.data());
   }
-  if (report.genus_in != report.genus_out || report.pieces_out != 1) {
-    report.warnings.push_back("the fitted surface has " + counted(report.pieces_out, "piece") + " and " + counted(static_cast<std::size_t>(std::max(0L, report.genus_out)), "handle") + ", the data has 1 piece and " +
+  if (report.genus_in != report.genus_out || report.pieces_out != data.pieces) {
+    report.warnings.push_back("the fitted surface has " + counted(report.pieces_out, "piece") + " and " + counted(static_cast<std::size_t>(std::max(0L, report.genus_out)), "handle") + ", the data has " + counted(data.pieces, "piece") + " and " +
                               counted(static_cast<std::size_t>(std::max(0L, report.genus_in)), "handle"));
   }
 }
 
+/// The surface that is fitted: the data, or a layer about it, of which the middle is kept.
+Mesh surface_of(const std::filesystem::path& file, FitOptions& options, FittedObject& object, Mesh& middle, const Executor& executor) {
+  Mesh mesh = read_surface(file, options, object.report.repair, executor);
+  if (options.kind == Kind::Solid) return mesh;
+  const double spacing = std::sqrt(inspect(mesh).area / options.particles);
+  constexpr double kShare = 1.0 / 3.0;
+  object.thickness = options.thickness.value_or(kShare * spacing);
+  middle = mesh;
+  mesh = thickened(middle, object.thickness);
+  Box box;
+  for (const Vec3& p : mesh.position) box.include(p);
+  constexpr double kOfThickness = 0.25, kLeastError = 1e-3;  // a coarser surface would have holes
+  options.error = std::max(kLeastError, std::min(options.error, kOfThickness * object.thickness / box.extent().norm()));
+  return mesh;
+}
+
 }  // namespace
 
-FittedObject fit(const std::filesystem::path& file, const FitOptions& options) {
+FittedObject fit(const std::filesystem::path& file, const FitOptions& asked) {
   const auto begin = std::chrono::steady_clock::now();
-  check(options);
+  check(asked);
+  FitOptions options = asked;
   const Executor executor(options.threads);
   FittedObject object;
   FitReport& report = object.report;
-  Mesh mesh = read_surface(file, options, report.repair, executor);
+  Mesh middle_surface;
+  Mesh mesh = surface_of(file, options, object, middle_surface, executor);
   const Frame frame = normalise(mesh);
+  for (Vec3& p : middle_surface.position) p = (p - frame.middle) / frame.diagonal;
   report.diagonal = frame.diagonal;
   const double volume = inspect(mesh).volume;
   report.volume = volume * frame.diagonal * frame.diagonal * frame.diagonal;
@@ -349,11 +405,8 @@ FittedObject fit(const std::filesystem::path& file, const FitOptions& options) {
   constexpr double kLargestBall = 1.25;  // of the spacing: a primitive moves with one particle
   const Data data(mesh, std::min(0.5, kLargestBall * spacing), options.error, executor);
   const Skeleton skeleton = fit_skeleton(data, options, executor);
-  constexpr double kPointsOfShare = 40.0, kLeastPoints = 20000.0;
-  const double points = std::max(kPointsOfShare * options.particles, kLeastPoints);
-  const Surroundings lattice = sample_surroundings(mesh, data.tree, math::pow(volume / points, 1.0 / 3.0), executor);
-  const Packing packing = pack_inside(lattice, options.particles, executor);
-  hang(object, skeleton, packing, lattice, frame);
+  object.material = options.material;
+  const Packing packing = options.kind == Kind::Solid ? add_solid(object, skeleton, data, options, executor) : add_shell(object, skeleton, middle_surface, options, executor);
   const Vec3 middle = centre_of_mass(mesh);
   object.origin = frame.middle + frame.diagonal * middle;
   object.spacing = frame.diagonal * spacing;

@@ -48,7 +48,8 @@ std::string object_text(const FittedObject& object, const std::string& title) {
       100.0 * r.two_sided());
   out += "# A scene uses it by `include` in an item of `objects`, where other keys replace these.\n";
   out += "# The origin is the centre of mass, in the data " + point_text(object.origin) + ".\n";
-  out += "material: {youngs_modulus: 50 kPa, density: 1000 kg/m^3}\ncontact: true\n";
+  const Substance& m = object.material;
+  put(out, "material: {youngs_modulus: %.7g, density: %.7g, poissons_ratio: %.7g, damping_ratio: %.7g, friction: %.7g}\ncontact: true\n", m.youngs_modulus, m.density, m.poissons_ratio, m.damping_ratio, m.friction);
   out += "particles:\n  arrange: points\n  points:\n";
   for (const Vec3& p : object.particles) out += "  - " + point_text(p) + '\n';
   if (!object.bonds.empty()) {
@@ -57,6 +58,20 @@ std::string object_text(const FittedObject& object, const std::string& title) {
       constexpr std::size_t kOfLine = 16;
       put(out, "%s%u, %u", k == 0 ? "" : k % kOfLine == 0 ? ",\n    " : ", ", object.bonds[k][0], object.bonds[k][1]);
     }
+    out += "]\n  sections: [";
+    for (std::size_t k = 0; k < object.sections.size(); ++k) {
+      constexpr std::size_t kOfLine = 16;
+      put(out, "%s%.4g", k == 0 ? "" : k % kOfLine == 0 ? ",\n    " : ", ", object.sections[k]);
+    }
+    out += "]\n";
+  }
+  if (!object.frames.empty()) {
+    put(out, "  thickness: %.7g\n  normals:\n", object.thickness);
+    for (const FittedFrame& f : object.frames) out += "  - " + point_text(f.normal) + '\n';
+    out += "  directions:\n";
+    for (const FittedFrame& f : object.frames) out += "  - " + point_text(f.direction) + '\n';
+    out += "  curvatures: [";
+    for (std::size_t k = 0; k < object.frames.size(); ++k) put(out, "%s%.6g, %.6g", k == 0 ? "" : ", ", object.frames[k].first, object.frames[k].second);
     out += "]\n";
   }
   out += "skeleton:\n";

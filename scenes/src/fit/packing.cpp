@@ -57,25 +57,33 @@ std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i) {
   return i;
 }
 
-void add_bonds(const Surroundings& around, Packing& packing) {
+/// The faces of the lattice between the shares of a pair.
+struct Shared {
+  Face face;
+  double count = 0.0;
+};
+
+std::map<std::array<std::uint32_t, 2>, Shared> shared_faces(const Surroundings& around, const Packing& packing) {
   const PointTree tree(around.inside);
-  std::map<std::array<std::uint32_t, 2>, int> faces;
+  std::map<std::array<std::uint32_t, 2>, Shared> out;
   std::vector<std::uint32_t> near;
   for (std::uint32_t k = 0; k < around.inside.size(); ++k) {
     constexpr double kNext = 1.1;  // of the step: the six points beside
     tree.within(around.inside[k], kNext * around.step, near);
     for (const std::uint32_t other : near) {
-      const auto [a, b] = std::minmax(packing.share[k], packing.share[other]);
-      if (other > k && a != b) ++faces[{a, b}];
+      const std::uint32_t a = packing.share[k], b = packing.share[other];
+      if (a >= b) continue;  // each face once, from its first particle
+      Shared& shared = out[{a, b}];
+      shared.face.area += around.step * (around.inside[other] - around.inside[k]);
+      shared.face.centre += 0.5 * (around.inside[other] + around.inside[k]);
+      shared.count += 1.0;
     }
   }
-  std::vector<std::uint32_t> parent(packing.particle.size());
-  std::iota(parent.begin(), parent.end(), 0U);
-  for (const auto& [pair, count] : faces) {
-    packing.bond.push_back(pair);
-    parent[root_of(parent, pair[0])] = root_of(parent, pair[1]);
-  }
-  // What the lattice leaves apart, by the shortest bond between two parts.
+  return out;
+}
+
+/// What the lattice leaves apart, by the shortest bond between two parts, of the section of one point.
+void join_parts(const Surroundings& around, std::vector<std::uint32_t>& parent, std::map<std::array<std::uint32_t, 2>, Shared>& faces, const Packing& packing) {
   for (;;) {
     std::array<std::uint32_t, 2> best{};
     double least = std::numeric_limits<double>::infinity();
@@ -90,13 +98,26 @@ void add_bonds(const Surroundings& around, Packing& packing) {
       }
     }
     if (!std::isfinite(least)) break;
-    packing.bond.push_back(best);
+    const Vec3 &a = packing.particle[best[0]], &b = packing.particle[best[1]];
+    faces[best] = {{around.step * around.step * (b - a).normalized(), 0.5 * (a + b)}, 1.0};
     parent[root_of(parent, best[0])] = root_of(parent, best[1]);
   }
-  std::sort(packing.bond.begin(), packing.bond.end());
 }
 
-/// Whether bonds lead from the first particle to all others.
+void add_bonds(const Surroundings& around, Packing& packing) {
+  std::map<std::array<std::uint32_t, 2>, Shared> faces = shared_faces(around, packing);
+  std::vector<std::uint32_t> parent(packing.particle.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  for (const auto& [pair, shared] : faces) parent[root_of(parent, pair[0])] = root_of(parent, pair[1]);
+  join_parts(around, parent, faces, packing);
+  for (const auto& [pair, shared] : faces) {
+    packing.bond.push_back(pair);
+    packing.face.push_back({shared.face.area, shared.face.centre / shared.count});
+  }
+}
+
+}  // namespace
+
 bool is_connected(const Packing& packing) {
   std::vector<std::uint32_t> parent(packing.particle.size());
   std::iota(parent.begin(), parent.end(), 0U);
@@ -110,11 +131,8 @@ bool is_connected(const Packing& packing) {
   return parts == 1;
 }
 
-}  // namespace
-
-Packing pack_inside(const Surroundings& around, std::size_t count, const Executor& executor) {
+Packing pack_points(const std::vector<Vec3>& points, std::size_t count, const Executor& executor) {
   Packing out;
-  const std::vector<Vec3>& points = around.inside;
   count = std::min(count, points.size());
   out.particle = far_points(points, count);
   out.share.resize(points.size());
@@ -125,6 +143,11 @@ Packing pack_inside(const Surroundings& around, std::size_t count, const Executo
     centre(points, out);
   }
   assign_shares(points, out, executor);
+  return out;
+}
+
+Packing pack_inside(const Surroundings& around, std::size_t count, const Executor& executor) {
+  Packing out = pack_points(around.inside, count, executor);
   add_bonds(around, out);
   out.connected = is_connected(out);
   return out;

@@ -9,12 +9,25 @@
 
 namespace supple::fit {
 
+/// Between the shares of two bonded particles.
+struct Face {
+  Vec3 area = Vec3::Zero();    ///< along its normal, from the first particle to the second
+  Vec3 centre = Vec3::Zero();
+};
+
 struct Packing {
   std::vector<Vec3> particle;
   std::vector<std::uint32_t> share;                   ///< of each point of the lattice inside: the particle that it belongs to
   std::vector<std::array<std::uint32_t, 2>> bond;     ///< sorted
+  std::vector<Face> face;                             ///< of each bond; faces close around shares that have no free boundary
   bool connected = false;
 };
+
+/// Whether bonds lead from the first particle to all others.
+[[nodiscard]] bool is_connected(const Packing& packing);
+
+/// Particles and their shares of points, without bonds.
+[[nodiscard]] Packing pack_points(const std::vector<Vec3>& points, std::size_t count, const Executor& executor);
 
 /// Centroidal Voronoi tessellation of the points of the lattice (Lloyd 1982), from points that lie farthest from one another. Bonds join particles whose shares
 /// have a common face within the solid, so not across a gap; parts that a neck thinner than the lattice joins get a bond between their nearest particles.

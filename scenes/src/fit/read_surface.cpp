@@ -129,7 +129,7 @@ void close_holes(const std::filesystem::path& file, SurfaceMesh& mesh, Repair& r
     ++repair.holes;
     if (closed > kMostClosed * (area + closed)) {
       refuse(file, "expected holes whose closing adds less than a tenth of the area", counted(cycles.size(), "hole") + ", the largest part at " + text_of(at),
-             "close them in a mesh editor; surfaces without inside are not fitted");
+             "close them in a mesh editor, or fit a surface without inside by --kind shell");
     }
   }
   repair.closed_area = closed / (area + closed);
@@ -193,14 +193,16 @@ Mesh read_surface(const std::filesystem::path& file, const FitOptions& options, 
   SurfaceMesh mesh;
   pmp::polygon_soup_to_polygon_mesh(soup.points, soup.faces, mesh);
   pmp::triangulate_faces(mesh);
-  close_holes(file, mesh, repair);
+  const bool solid = options.kind == Kind::Solid;
+  if (solid) close_holes(file, mesh, repair);
   keep_pieces(file, mesh, options.pieces, repair);
-  repair.turned = !pmp::is_outward_oriented(mesh);
+  repair.turned = CGAL::is_closed(mesh) && !pmp::is_outward_oriented(mesh);
   if (repair.turned) pmp::reverse_face_orientations(mesh);
   repair.vertices = mesh.number_of_vertices();
   repair.triangles = mesh.number_of_faces();
+  if (!solid) return plain_mesh(mesh);
   const double volume = pmp::volume(mesh), area = pmp::area(mesh);
-  if (!(volume > 1e-6 * area * std::sqrt(area))) refuse(file, "expected a mesh that encloses a volume", "a flat one", "surfaces without inside are not fitted");
+  if (!(volume > 1e-6 * area * std::sqrt(area))) refuse(file, "expected a mesh that encloses a volume", "a flat one", "fit a surface without inside by --kind shell");
   return plain_mesh(mesh);
 }
 

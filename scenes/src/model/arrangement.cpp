@@ -80,6 +80,16 @@ Quat from_z_to(const Vec3& direction) {
   return Quat(1.0 + a.z(), -a.y(), a.x(), 0.0).normalized();
 }
 
+/// z along the normal, x as near to the direction as it allows.
+Quat frame_of(const Vec3& normal, const Vec3& direction) {
+  Mat3 axes;
+  axes.col(2) = normal.normalized();
+  const Vec3 along = direction - direction.dot(axes.col(2)) * axes.col(2);
+  axes.col(0) = along.norm() > 1e-6 * direction.norm() ? Vec3(along.normalized()) : Vec3(axes.col(2).unitOrthogonal());
+  axes.col(1) = axes.col(2).cross(axes.col(0));
+  return Quat(axes);
+}
+
 }  // namespace
 
 core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std::string& key, ModelFaults& faults) {
@@ -101,6 +111,7 @@ core::Arrangement arrange(const Scene& scene, const ParticlesDesc& d, const std:
     case ArrangeKind::Points:
       out.position = d.points;
       out.orientation.assign(d.points.size(), Quat::Identity());
+      for (std::size_t i = 0; i < d.normals.size(); ++i) out.orientation[i] = frame_of(d.normals[i], d.directions[i]);
       break;
     case ArrangeKind::File:
       out = faults.read(key + ".file", [&] { return io::read_particles(named_file(files_of(scene), d.file), kMost); }).value_or(core::Arrangement());

@@ -7,7 +7,9 @@
 #include <map>
 #include <numbers>
 
+#include "model/bond_stiffness.h"
 #include "model/model_contact.h"
+#include "supple/core/directed_form.h"
 #include "supple/implicit/volume.h"
 
 namespace supple::scenes {
@@ -80,13 +82,6 @@ Lattice lattice_of(const ParticlesDesc& d) {
   return {{d.count, 1, 1}};
 }
 
-/// Stiffness of the bonds of a material, for whole cells.
-struct BondStiffness {
-  double along = 0.0;     ///< k_n [N/m]
-  double across = 0.0;    ///< k_t [N/m]
-  double rotation = 0.0;  ///< k_theta [N m]
-};
-
 /// Size of the body for its slowest vibration.
 struct Slenderness {
   double length = 0.0;   ///< [m]
@@ -137,19 +132,6 @@ class MaterialBonds {
   core::BondedLaw<core::LinearCohesion> along_;
   core::BondedLaw<core::BondFrame> frame_;
 };
-
-/// A rod of round section between neighbours at this distance. The share of the bending stiffness that resists sliding makes the twist that of
-/// nu = 1/4, G J = 4/5 E I; a tip bends by 3.5 (distance / length)^2 too far.
-BondStiffness rod_bond(double youngs_modulus, double radius, double distance) {
-  constexpr double kSlidingShare = 0.2;
-  constexpr double kShear = 0.36;  // of round sections: kappa G / E with kappa = 0.9, G = 0.4 E
-  const double area = std::numbers::pi * radius * radius, second = 0.25 * area * radius * radius;
-  BondStiffness k;
-  k.along = youngs_modulus * area / distance;
-  k.across = std::min(kSlidingShare * 4.0 * youngs_modulus * second / (distance * distance * distance), kShear * k.along);
-  k.rotation = 0.5 * (youngs_modulus * second / distance - 0.25 * k.across * distance * distance);
-  return k;
-}
 
 /// Shares of the cells between particles along one axis, over the spacing: outer ones are wider by `beyond` / spacing.
 std::vector<double> cell_shares(int particles, double beyond) {
@@ -252,7 +234,7 @@ Slenderness add_block(const FilledLattice& body, const std::string& key, Materia
   for (std::size_t axis = 0; axis < 3; ++axis) extent[static_cast<Eigen::Index>(axis)] = spacing * (lattice.count[axis] - 1);
   const double beyond = extent.prod() < volume ? root_of_rising(std::cbrt(volume), [&](double b) { return (extent + Vec3::Constant(2.0 * b)).prod() - volume; }) : 0.0;
   expect_filled(beyond, key, faults);
-  const double nu = d.poissons_ratio, alpha = (1.0 - 4.0 * nu) / (1.0 + nu);
+  const double nu = d.poissons_ratio, alpha = sliding_ratio(nu);
   LatticeBonds bonds(lattice, beyond / spacing, out);
   Eigen::Index thin = 0;
   extent.minCoeff(&thin);
@@ -296,7 +278,7 @@ Slenderness add_sheet(const FilledLattice& body, const std::string& key, Materia
 Slenderness add_solid(const ObjectDesc& d, const ObjectModel& object, const Model& model, const std::string& key, MaterialBonds& out, ModelFaults& faults) {
   constexpr double kReach = 1.5;           // of the spacing: edges and face diagonals
   constexpr double kSquaresOfCell = 15.0;  // sum of (length / spacing)^2 of the bonds of a cell
-  const double s = d.particles.spacing, nu = d.material->poissons_ratio, alpha = (1.0 - 4.0 * nu) / (1.0 + nu);
+  const double s = d.particles.spacing, nu = d.material->poissons_ratio, alpha = sliding_ratio(nu);
   const core::Bonds bonds = core::bonds_within(model.rest.position, object.first, object.last, kReach * s);
   double squares = 0.0;
   Box box;
@@ -313,26 +295,71 @@ Slenderness add_solid(const ObjectDesc& d, const ObjectModel& object, const Mode
   return {whole.maxCoeff(), whole.minCoeff() / std::sqrt(12.0)};
 }
 
-/// A body of particles that each fill an equal share, with bonds between neighbouring shares of one section A each. E is that of isotropic bonds that deform
-/// alike, E V = (2 + 3 alpha)(1 + nu) sum k l^2 / 15 with k = E A / l; a chain of such bonds is a round rod of this section.
-Slenderness add_packing(const ObjectDesc& d, const ObjectModel& object, const Model& model, MaterialBonds& out) {
-  const std::vector<int>& bonds = d.particles.bonds;
-  const double nu = d.material->poissons_ratio, alpha = (1.0 - 4.0 * nu) / (1.0 + nu);
-  const auto place = [&](std::uint32_t i) -> const Vec3& { return model.rest.position[object.first + i]; };
-  const auto pair = [&](std::size_t b) { return std::pair(static_cast<std::uint32_t>(bonds[2 * b]), static_cast<std::uint32_t>(bonds[2 * b + 1])); };
-  double lengths = 0.0;
-  for (std::size_t b = 0; b < bonds.size() / 2; ++b) lengths += (place(pair(b).second) - place(pair(b).first)).norm();
-  const double section = 15.0 * object.solid_volume / ((2.0 + 3.0 * alpha) * (1.0 + nu) * lengths);
-  for (std::size_t b = 0; b < bonds.size() / 2; ++b) {
-    const auto [i, j] = pair(b);
-    BondStiffness k = rod_bond(d.material->youngs_modulus, std::sqrt(section / std::numbers::pi), (place(j) - place(i)).norm());
-    k.across = std::max(k.across, alpha * k.along);
-    out.add(i, j, k);
+/// The listed bonds of particles at points.
+class PointBonds {
+ public:
+  PointBonds(const ObjectDesc& d, const ObjectModel& object, const Model& model) : d_(d.particles), object_(object), model_(model) {
+    double lengths = 0.0;
+    for (std::size_t b = 0; b < size(); ++b) lengths += length(b);
+    constexpr double kDimensions = 3.0;  // sections of shares that fill V: sum of section times length = 3 V
+    equal_section_ = kDimensions * object.solid_volume / lengths;
   }
-  Box box;
-  for (std::uint32_t i = object.first; i < object.last; ++i) box.include(model.rest.position[i]);
-  const Vec3 whole = box.extent() + Vec3::Constant(std::sqrt(section));
+  [[nodiscard]] std::size_t size() const { return d_.bonds.size() / 2; }
+  [[nodiscard]] std::uint32_t first(std::size_t b) const { return static_cast<std::uint32_t>(d_.bonds[2 * b]); }
+  [[nodiscard]] std::uint32_t second(std::size_t b) const { return static_cast<std::uint32_t>(d_.bonds[2 * b + 1]); }
+  [[nodiscard]] double length(std::size_t b) const { return (place(second(b)) - place(first(b))).norm(); }
+  [[nodiscard]] double section(std::size_t b) const { return d_.sections.empty() ? equal_section_ : d_.sections[b]; }
+  [[nodiscard]] Vec3 extent() const {
+    Box box;
+    for (std::uint32_t i = object_.first; i < object_.last; ++i) box.include(model_.rest.position[i]);
+    return box.extent();
+  }
+
+ private:
+  [[nodiscard]] const Vec3& place(std::uint32_t i) const { return model_.rest.position[object_.first + i]; }
+  const ParticlesDesc& d_;
+  const ObjectModel& object_;
+  const Model& model_;
+  double equal_section_ = 0.0;
+};
+
+/// A body of particles that each fill an equal share, with bonds between neighbouring shares; see `packing_bond`.
+Slenderness add_packing(const ObjectDesc& d, const ObjectModel& object, const Model& model, MaterialBonds& out) {
+  const PointBonds bonds(d, object, model);
+  double sections = 0.0;
+  for (std::size_t b = 0; b < bonds.size(); ++b) {
+    out.add(bonds.first(b), bonds.second(b), packing_bond(d.material->youngs_modulus, d.material->poissons_ratio, bonds.section(b), bonds.length(b)));
+    sections += bonds.section(b);
+  }
+  const Vec3 whole = bonds.extent() + Vec3::Constant(std::sqrt(sections / static_cast<double>(bonds.size())));
   return {whole.maxCoeff(), whole.minCoeff() / std::sqrt(12.0)};
+}
+
+/// A shell of elements with bonds between neighbours whose shares of the surface have a common edge of width w; section = w h. In a plane,
+/// bonds of k_n = k section / l and k_t = alpha k_n have k = 4 E / ((1 - nu^2)(3 + alpha)), alpha = (1 - 3 nu)/(1 + nu) (as add_sheet). Bending E h^3 / 12 is that of
+/// directed_form with the measured curvatures, sum of strengths = E h^3 / 12 times the area, less what frames across take.
+Slenderness add_shell(const ObjectDesc& d, const ObjectModel& object, Model& model, MaterialBonds& out) {
+  const PointBonds bonds(d, object, model);
+  const double thickness = d.particles.thickness, young = d.material->youngs_modulus, nu = d.material->poissons_ratio;
+  const double alpha = std::max(0.0, (1.0 - 3.0 * nu) / (1.0 + nu)), factor = 4.0 / ((1.0 - nu * nu) * (3.0 + alpha));
+  std::vector<Mat3> shape;
+  for (std::size_t i = 0; i < d.particles.normals.size(); ++i) shape.push_back(Vec3(d.particles.curvatures[2 * i], d.particles.curvatures[2 * i + 1], 0.0).asDiagonal());
+  core::BondedLaw<core::DirectedForm> form{object.name + "/material_form", {}, {}, {}};
+  for (std::size_t b = 0; b < bonds.size(); ++b) {
+    const double length = bonds.length(b), width = bonds.section(b) / thickness;
+    const double strip = young * thickness * thickness * thickness / 12.0 * width;  // E I
+    constexpr double kSlidingShare = 0.2;
+    BondStiffness k;
+    k.along = factor * young * bonds.section(b) / length;
+    k.across = std::min(std::max(alpha, kSlidingShare) * k.along, kSlidingShare * 4.0 * strip / (length * length * length));
+    out.add(bonds.first(b), bonds.second(b), k);
+    const double strength = 0.5 * strip * length - 0.125 * k.across * std::pow(length, 4);
+    form.first.push_back(object.first + std::min(bonds.first(b), bonds.second(b)));
+    form.second.push_back(object.first + std::max(bonds.first(b), bonds.second(b)));
+    form.law.push_back({strength, shape[form.first.back() - object.first], shape[form.second.back() - object.first], {}});
+  }
+  model.interactions.directed_form.push_back(std::move(form));
+  return {bonds.extent().maxCoeff() + thickness, thickness / std::sqrt(12.0)};
 }
 
 Slenderness add_rod(const ObjectDesc& d, const ObjectModel& object, const Model& model, double volume, MaterialBonds& out) {
@@ -346,7 +373,7 @@ Slenderness add_rod(const ObjectDesc& d, const ObjectModel& object, const Model&
   const double caps = closed ? 0.0 : 4.0 / 3.0 * std::numbers::pi;  // an open rod ends in half balls
   const double radius = root_of_rising(std::sqrt(volume / (std::numbers::pi * length)),
                                        [&](double r) { return (std::numbers::pi * length + caps * r) * r * r - volume; });
-  for (std::uint32_t b = 0; b < bonds; ++b) out.add(b, (b + 1) % n, rod_bond(d.material->youngs_modulus, radius, distance(b)));
+  for (std::uint32_t b = 0; b < bonds; ++b) out.add(b, (b + 1) % n, rod_bond(d.material->youngs_modulus, std::numbers::pi * radius * radius, distance(b)));
   return {length + (closed ? 0.0 : 2.0 * radius), 0.5 * radius};
 }
 
@@ -409,7 +436,7 @@ void add_material_laws(const ObjectDesc& d, const ObjectModel& object, const std
   const FilledLattice filled{*d.material, lattice, d.particles.spacing, volume};
   Slenderness body;
   if (d.particles.arrange == ArrangeKind::Points) {
-    body = add_packing(d, object, model, bonds);
+    body = d.particles.normals.empty() ? add_packing(d, object, model, bonds) : add_shell(d, object, model, bonds);
     finish(d, body, object, bonds, model);
     return;
   }

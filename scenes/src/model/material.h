@@ -10,7 +10,8 @@
 ///   of the bending stiffness E W^3 / 12 across the least width W.
 /// - Sheets (one layer): the same in a plane, diagonals of half the stiffness, alpha = (1 - 3 nu)/(1 + nu); thickness h by V, bending E h^3 / 12.
 /// - Other solids (balls, filled meshes): the bonds of blocks, all equal, without k_theta; E is met on average, about a tenth less near the surface.
-/// - Points with bonds: bonds of equal section between particles that fill equal shares, with k_theta and the least k_t of rods, so that thin parts bend.
+/// - Points with bonds: particles that fill shares of the solid, with bonds by the sections of the faces between them (model/bond_stiffness.h).
+/// - Points with normals: a shell, with frames in its plane and directed_form of the measured curvatures across.
 /// - Rods (lines, rings, spirals, curves): round, of the radius that gives V: EA, EI and GJ (of nu = 1/4) by k_n, k_t and k_theta.
 #pragma once
 

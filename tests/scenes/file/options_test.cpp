@@ -155,6 +155,23 @@ void add_arrangements(std::vector<Option>& all) {
   all.push_back(differs("objects.particles.bonds", In::State,
                         {.particles = "arrange: points, points: [[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0]], bonds: [$]", .interactions = "",
                          .object = "material: {youngs_modulus: 1e4, density: 1000}\n    loads: [{particle: 0, force: [1, 0.5, 2]}]"}, "0, 1, 1, 2", "0, 1, 0, 2"));
+  const std::string places = "arrange: points, points: [[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0]], bonds: [0, 1, 1, 2]";
+  const auto shell = [&](const std::string& key, const std::string& one, const std::string& other) {
+    std::string rest;
+    for (const auto& [name, value] : {std::pair<std::string, std::string>{"sections", "0.01, 0.01"}, {"normals", "[0, 0, 1], [0, 0, 1], [0, 0, 1]"}, {"directions", "[1, 0, 0], [1, 0, 0], [1, 0, 0]"},
+                                      {"curvatures", "1, 0, 1, 0, 1, 0"}}) {
+      rest += ", " + name + ": [" + (name == key ? "$" : value) + ']';
+    }
+    rest += std::string(", thickness: ") + (key == "thickness" ? "$" : "0.05");
+    all.push_back(differs("objects.particles." + key, In::State,
+                          {.particles = places + rest, .interactions = "", .object = "material: {youngs_modulus: 1e4, density: 1000}\n    loads: [{particle: 0, force: [1, 0.5, 2]}]"}, one,
+                          other));
+  };
+  shell("sections", "0.01, 0.01", "0.01, 0.02");
+  shell("normals", "[0, 0, 1], [0, 0, 1], [0, 0, 1]", "[0, 0, 1], [0, 0.1, 1], [0, 0, 1]");
+  shell("directions", "[1, 0, 0], [1, 0, 0], [1, 0, 0]", "[1, 1, 0], [1, 0, 0], [1, 0, 0]");
+  shell("curvatures", "1, 0, 1, 0, 1, 0", "1, 0, 1, 0, 2, 0");
+  shell("thickness", "0.05", "0.06");
   all.push_back(differs("objects.scale", In::State, {.interactions = "", .object = "scale: $"}, "1", "2"));
   loaded("inertia_axes", "[0.2, 0.2, 0.2]", "[0.1, 0.2, 0.3]");
 }

@@ -20,6 +20,11 @@ enum class Pieces : std::uint8_t {
   Largest,  ///< the one with the largest volume is fitted
 };
 
+enum class Kind : std::uint8_t {
+  Solid,  ///< the inside of the surface
+  Shell,  ///< a layer about the surface, which may be open
+};
+
 /// What lies inside the surface of a volume: one of these. Level sets of OpenVDB need none.
 struct VolumeOptions {
   std::optional<double> iso{};                   ///< values above
@@ -29,12 +34,24 @@ struct VolumeOptions {
   [[nodiscard]] bool given() const { return iso || window || label; }
 };
 
+/// Of the object: keys of `material` in scene files.
+struct Substance {
+  double youngs_modulus = 50e3;  ///< [Pa], > 0
+  double density = 1000.0;       ///< [kg/m^3], > 0
+  double poissons_ratio = 0.2;   ///< in [0, 0.25]
+  double damping_ratio = 0.05;   ///< in [0, 1]
+  double friction = 0.5;         ///< >= 0
+};
+
 struct FitOptions {
   double error = 0.01;           ///< largest distance between the surfaces, either way, over the diagonal of the data's box; in [1e-3, 0.1]
   std::uint32_t particles = 200; ///< of the object; in [1, 10000]
   std::uint32_t primitives = 2000;  ///< at most; in [1, 10000]
   Pieces pieces = Pieces::Refuse;
+  Kind kind = Kind::Solid;
+  std::optional<double> thickness{};  ///< of a shell [m]; absent: a third of the distance between particles
   VolumeOptions volume{};
+  Substance material{};
   int threads = 0;               ///< 0: all of the machine; does not change the result
 };
 
@@ -80,9 +97,16 @@ struct FitReport {
 /// An ellipsoid of support with Wyvill's kernel (implicit/skeleton.h).
 struct FittedPrimitive {
   std::uint32_t particle = 0;            ///< that carries it
-  Vec3 at = Vec3::Zero();                ///< from the particle [m]; frames of particles have the axes of the data
+  Vec3 at = Vec3::Zero();                ///< from the particle, in its frame [m]; frames of solids have the axes of the data
   Vec3 semi_axes = Vec3::Zero();         ///< of the support [m]; three equal ones: a point
   Quat orientation = Quat::Identity();   ///< of the axes
+};
+
+/// A particle of a shell.
+struct FittedFrame {
+  Vec3 normal = Vec3::UnitZ();     ///< z of its frame, outward
+  Vec3 direction = Vec3::UnitX();  ///< x of its frame, along which the first curvature is
+  double first = 0.0, second = 0.0;  ///< principal curvatures [1/m], > 0 where the shell bulges along the normal
 };
 
 struct FittedObject {
@@ -90,7 +114,11 @@ struct FittedObject {
   double spacing = 0.0;                                 ///< of the particles: cube root of the volume of one [m]
   std::vector<Vec3> particles;                          ///< centres of equal shares of the volume [m]
   std::vector<std::array<std::uint32_t, 2>> bonds;      ///< between particles whose shares have a common face, sorted
+  std::vector<double> sections;                         ///< of the bonds [m^2]: the body has the modulus of a material of this Poisson's ratio
+  std::vector<FittedFrame> frames;                      ///< of the particles of a shell
+  double thickness = 0.0;                               ///< of a shell [m]
   std::vector<FittedPrimitive> primitives;              ///< sorted by particle
+  Substance material;
   Mesh surface;                                         ///< fitted [m], with the column `distance` to the data [m]
   Mesh data;                                            ///< mended [m], with the column `distance` to the fitted surface [m]
   FitReport report;

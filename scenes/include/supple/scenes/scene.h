@@ -53,6 +53,11 @@ struct ParticlesDesc {
   double length = 0.0;                ///< tube, along z [m]
   std::vector<Vec3> points;           ///< curve: points on its way; points: the particles [m]
   std::vector<int> bonds;             ///< points: pairs of particles that a material joins, one after the other
+  std::vector<double> sections;       ///< points: of the bonds [m^2]; empty: all equal
+  std::vector<Vec3> normals;          ///< points: of a shell, outward; empty: a solid
+  std::vector<Vec3> directions;       ///< points: of a shell, along which its first curvature is measured
+  double thickness = 0.0;             ///< points: of a shell [m]
+  std::vector<double> curvatures;     ///< points: of a shell, two for each particle [1/m]
   Vec3 size = Vec3::Zero();           ///< scatter: edges of a box [m]
   int seed = 1;                       ///< scatter
   std::string file;                   ///< file: CSV or PLY of particles; fill: OBJ or PLY of a closed mesh; beside the scene
