@@ -48,9 +48,9 @@ TEST(FitRefuses, FilesThatAreNoMesh) {
 
 TEST(FitRefuses, SurfacesWithoutInside) {
   EXPECT_EQ(message("open.off", off("0 0 0\n1 0 0\n1 1 0\n0 1 0\n", "3 0 1 2\n3 0 2 3\n")),
-            "open.off: expected holes whose closing adds less than a tenth of the area, found 1 hole, the largest part at (1, 0, 0); close them in a mesh editor; surfaces without inside are not fitted");
+            "open.off: expected holes whose closing adds less than a tenth of the area, found 1 hole, the largest part at (1, 0, 0); close them in a mesh editor, or fit a surface without inside by --kind shell");
   EXPECT_EQ(message("flat.off", off("0 0 0\n1 0 0\n1 1 0\n0 1 0\n", "3 0 1 2\n3 0 2 3\n3 1 0 3\n3 1 3 2\n")),
-            "flat.off: expected a mesh that encloses a volume, found a flat one; surfaces without inside are not fitted");
+            "flat.off: expected a mesh that encloses a volume, found a flat one; fit a surface without inside by --kind shell");
 }
 
 TEST(FitRefuses, ThreeTrianglesAtAnEdge) {

@@ -353,8 +353,8 @@ void Expansion::stand(Node& item, const std::string& key, std::vector<Node*>& ou
   emit(item, *entry, key, out);
 }
 
-/// A number of a mapping in SI units, of the dimension of `like`. @throws ExpressionFault
-double Expansion::number_of(const Node& mapping, std::string_view name, std::string_view like, double otherwise, const std::string& key) {
+/// A number of a mapping in SI units, of the dimension of `like`; none where it has a fault.
+std::optional<double> Expansion::number_of(const Node& mapping, std::string_view name, std::string_view like, double otherwise, const std::string& key) {
   const Node::Entry* entry = mapping.find(name);
   if (entry == nullptr) return otherwise;
   try {
@@ -365,7 +365,7 @@ double Expansion::number_of(const Node& mapping, std::string_view name, std::str
   } catch (const ExpressionFault& fault) {
     fail(entry->value->mark, key + '.' + std::string(name), fault);
   }
-  return otherwise;
+  return std::nullopt;
 }
 
 /// `emit: {rate: 4 Hz, count: 20, from: 1 s}`: objects NAME.1, NAME.2 ... with `appears`, and the index i.
@@ -379,10 +379,12 @@ void Expansion::emit(Node& item, const Node::Entry& entry, const std::string& ke
   constexpr std::string_view kKeys[] = {"rate", "count", "from"};
   for (const Node::Entry& given : settings.entries) {
     if (std::find(std::begin(kKeys), std::end(kKeys), given.key) != std::end(kKeys)) continue;
-    fail(given.mark, place, {"expected one of rate, count, from", '\'' + shown(given.key) + '\'', known_hint(given.key, kKeys)});
+    return fail(given.mark, place, {"expected one of rate, count, from", '\'' + shown(given.key) + '\'', known_hint(given.key, kKeys)});
   }
-  const double rate = number_of(settings, "rate", "4 Hz", 0.0, place), from = number_of(settings, "from", "1 s", 0.0, place);
-  const double number = number_of(settings, "count", "20", 0.0, place);
+  const std::optional<double> given_rate = number_of(settings, "rate", "4 Hz", 0.0, place), given_from = number_of(settings, "from", "1 s", 0.0, place);
+  const std::optional<double> given_number = number_of(settings, "count", "20", 0.0, place);
+  if (!given_rate || !given_from || !given_number) return;
+  const double rate = *given_rate, from = *given_from, number = *given_number;
   if (!(rate > 0.0)) return fail(settings.mark, place + ".rate", {"expected a rate above 0", "none", ""});
   if (!(number >= 1.0) || number != std::floor(number) || number > static_cast<double>(kMostNodes))
     return fail(settings.mark, place + ".count", {"expected a whole number from 1 to " + std::to_string(kMostNodes), "another", ""});

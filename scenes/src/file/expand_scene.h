@@ -2,6 +2,7 @@
 /// What a scene file says in short, written out before its keys are read: `include`, `variables`, `defaults`, `repeat`, `emit` and ${expressions}.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -55,7 +56,7 @@ class Expansion {
   void repeat(Node& item, std::span<const std::pair<Index, std::size_t>> counts, const std::string& key, std::vector<Node*>& out);
   void stand(Node& item, const std::string& key, std::vector<Node*>& out);
   void emit(Node& item, const Node::Entry& entry, const std::string& key, std::vector<Node*>& out);
-  [[nodiscard]] double number_of(const Node& mapping, std::string_view name, std::string_view like, double otherwise, const std::string& key);
+  [[nodiscard]] std::optional<double> number_of(const Node& mapping, std::string_view name, std::string_view like, double otherwise, const std::string& key);
   void count(const Node& node, const std::string& key);
   void fail(Mark mark, const std::string& key, const ExpressionFault& fault);
 

@@ -62,15 +62,21 @@ void FaultList::raise() const {
   if (faults_.empty()) return;
   std::vector<Placed> sorted = faults_;
   std::stable_sort(sorted.begin(), sorted.end(), [](const Placed& a, const Placed& b) { return a.mark < b.mark; });
+  // What `repeat`, `emit` or `defaults` copies to many entries is one fault of the file.
+  const auto same = [](const Placed& a, const Placed& b) {
+    return a.mark == b.mark && a.fault.expected == b.fault.expected && a.fault.found == b.fault.found && a.fault.hint == b.fault.hint;
+  };
+  sorted.erase(std::unique(sorted.begin(), sorted.end(), same), sorted.end());
+  const std::size_t all = sorted.size() + (count_ - faults_.size());
   std::vector<Fault> out;
   for (Placed& placed : sorted) {
     if (out.size() == kMostShown) break;
     placed.fault.place = texts_.place(placed.mark);
     out.push_back(std::move(placed.fault));
   }
-  if (count_ > kMostShown) {
+  if (all > kMostShown) {
     std::string& hint = out.back().hint;
-    hint += (hint.empty() ? "(" : " (") + std::to_string(count_ - kMostShown) + " more faults are not shown)";
+    hint += (hint.empty() ? "(" : " (") + std::to_string(all - kMostShown) + " more faults are not shown)";
   }
   throw Error(ErrorKind::Scene, std::move(out));
 }

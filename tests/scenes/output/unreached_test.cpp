@@ -64,9 +64,11 @@ TEST_F(Unreached, AreNoneThatTheMotionPasses) {
 }
 
 TEST_F(Unreached, AreNoneThatTheRunTouched) {
-  run(flight(walls(wall("thin", 2.5))));
-  EXPECT_EQ(drawn(flight("")), 7);
-  EXPECT_EQ(drawn(flight(walls(wall("thin", 2.5) + ", " + wall("far", 9.0)))), 0);
+  run(flight(walls(wall("met", 2.5)), "[1, 0, 0]"));
+  EXPECT_EQ(drawn(flight("", "[1, 0, 0]")), 0);  // it is not met at this speed
+  run(flight(walls(wall("met", 0.3)), "[1, 0, 0]"));
+  EXPECT_EQ(drawn(flight("", "[1, 0, 0]")), 7);
+  EXPECT_EQ(drawn(flight(walls(wall("met", 0.3) + ", " + wall("far", 9.0)), "[1, 0, 0]")), 0);
 }
 
 TEST_F(Unreached, KeepTheOthersAndTheirNumbers) {
