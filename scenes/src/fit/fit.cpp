@@ -322,7 +322,7 @@ Packing add_solid(FittedObject& object, const Skeleton& skeleton, const Data& da
   const double points = std::max(kPointsOfShare * options.particles, kLeastPoints), volume = inspect(data.mesh).volume, diagonal = object.report.diagonal;
   const Surroundings lattice = sample_surroundings(data.mesh, data.tree, math::pow(volume / points, 1.0 / 3.0), executor);
   Packing packing = pack_inside(lattice, options.particles, executor);
-  for (const double area : bond_sections(packing, options.material.poissons_ratio)) object.sections.push_back(diagonal * diagonal * area);
+  for (const double area : bond_sections(data.mesh, lattice, packing, options.material.poissons_ratio)) object.sections.push_back(diagonal * diagonal * area);
   hang(object, skeleton, packing, lattice.inside, diagonal);
   return packing;
 }

@@ -57,10 +57,24 @@ std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i) {
   return i;
 }
 
-/// The faces of the lattice between the shares of a pair.
+/// The squares of the lattice between the shares of a pair.
 struct Shared {
-  Face face;
-  double count = 0.0;
+  std::vector<Vec3> centre, area;
+
+  [[nodiscard]] Face face() const {
+    Face out;
+    for (std::size_t k = 0; k < area.size(); ++k) {
+      out.area += area[k];
+      out.centre += centre[k] / static_cast<double>(area.size());
+    }
+    for (std::size_t k = 0; k < area.size(); ++k) {
+      const Vec3 arm = centre[k] - out.centre, n = area[k].normalized();
+      const Mat3 own = area[k].norm() / 12.0 * (Mat3::Identity() - n * n.transpose());  // of a square
+      out.first += arm * area[k].transpose();
+      for (Eigen::Index m = 0; m < 3; ++m) out.second[static_cast<std::size_t>(m)] += area[k][m] * (arm * arm.transpose() + own);
+    }
+    return out;
+  }
 };
 
 std::map<std::array<std::uint32_t, 2>, Shared> shared_faces(const Surroundings& around, const Packing& packing) {
@@ -74,9 +88,8 @@ std::map<std::array<std::uint32_t, 2>, Shared> shared_faces(const Surroundings& 
       const std::uint32_t a = packing.share[k], b = packing.share[other];
       if (a >= b) continue;  // each face once, from its first particle
       Shared& shared = out[{a, b}];
-      shared.face.area += around.step * (around.inside[other] - around.inside[k]);
-      shared.face.centre += 0.5 * (around.inside[other] + around.inside[k]);
-      shared.count += 1.0;
+      shared.area.push_back(around.step * (around.inside[other] - around.inside[k]));
+      shared.centre.push_back(0.5 * (around.inside[other] + around.inside[k]));
     }
   }
   return out;
@@ -99,7 +112,7 @@ void join_parts(const Surroundings& around, std::vector<std::uint32_t>& parent, 
     }
     if (!std::isfinite(least)) break;
     const Vec3 &a = packing.particle[best[0]], &b = packing.particle[best[1]];
-    faces[best] = {{around.step * around.step * (b - a).normalized(), 0.5 * (a + b)}, 1.0};
+    faces[best] = {{0.5 * (a + b)}, {around.step * around.step * (b - a).normalized()}};
     parent[root_of(parent, best[0])] = root_of(parent, best[1]);
   }
 }
@@ -112,7 +125,7 @@ void add_bonds(const Surroundings& around, Packing& packing) {
   join_parts(around, parent, faces, packing);
   for (const auto& [pair, shared] : faces) {
     packing.bond.push_back(pair);
-    packing.face.push_back({shared.face.area, shared.face.centre / shared.count});
+    packing.face.push_back(shared.face());
   }
 }
 

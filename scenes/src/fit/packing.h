@@ -13,6 +13,10 @@ namespace supple::fit {
 struct Face {
   Vec3 area = Vec3::Zero();    ///< along its normal, from the first particle to the second
   Vec3 centre = Vec3::Zero();
+  Mat3 first = Mat3::Zero();                   ///< sum of (x - centre) dA^T over the squares of the lattice that it consists of
+  std::array<Mat3, 3> second = no_moments();   ///< sum of (x - centre)(x - centre)^T dA_m, for each axis m
+
+  [[nodiscard]] static std::array<Mat3, 3> no_moments() { return {Mat3::Zero(), Mat3::Zero(), Mat3::Zero()}; }
 };
 
 struct Packing {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "model/bond_stiffness.h"
 #include "supple/core/interrupt.h"
@@ -26,13 +25,52 @@ Mat3 cross_matrix(const Vec3& d) {
   return out;
 }
 
+/// Volume and its second moments about its middle.
+struct Moments {
+  double volume = 0.0;
+  Mat3 second = Mat3::Zero();
+  Vec3 first = Vec3::Zero();
+
+  void add(double part, const Vec3& sum, const Mat3& square) {
+    volume += part;
+    first += sum;
+    second += square;
+  }
+  void centre() { second -= first * first.transpose() / volume; }
+  void turn(const Mat3& axes) { second = axes.transpose() * second * axes; }
+  /// Of the section across an axis: its area, or its second moment for bending, where the body is as long as it is far from its middle.
+  [[nodiscard]] double section(Eigen::Index along, Eigen::Index across) const {
+    return (across == along ? volume : second(across, across)) / std::sqrt(second(along, along) / volume);
+  }
+};
+
+Moments moments_of(const Mesh& mesh) {
+  Moments out;
+  for (const auto& t : mesh.triangle) {
+    const Vec3 &a = mesh.position[t[0]], &b = mesh.position[t[1]], &c = mesh.position[t[2]], sum = a + b + c;
+    const double part = a.dot(b.cross(c)) / 6.0;  // of a tetrahedron with the origin
+    out.add(part, 0.25 * part * sum, 0.05 * part * (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose()));
+  }
+  out.centre();
+  return out;
+}
+
+Moments moments_of(const Surroundings& lattice) {
+  Moments out;
+  const double square = lattice.step * lattice.step, cube = square * lattice.step;
+  for (const Vec3& p : lattice.inside) out.add(cube, cube * p, cube * (p * p.transpose() + square / 12.0 * Mat3::Identity()));
+  out.centre();
+  return out;
+}
+
 /// A packing in the principal axes of its particles.
 struct Body {
   std::vector<Vec3> place;
   std::vector<Face> face;
+  Moments solid, cubes;  ///< of the mesh and of the lattice
   Vec3 weight = Vec3::Zero();  ///< of the axes
 
-  explicit Body(const Packing& packing) : place(packing.particle), face(packing.face) {
+  Body(const Mesh& mesh, const Surroundings& lattice, const Packing& packing) : place(packing.particle), face(packing.face), solid(moments_of(mesh)), cubes(moments_of(lattice)) {
     Vec3 mean = Vec3::Zero();
     for (const Vec3& p : place) mean += p / static_cast<double>(place.size());
     Mat3 moment = Mat3::Zero();
@@ -41,9 +79,21 @@ struct Body {
     Mat3 axes = solver.eigenvectors();
     if (axes.determinant() < 0.0) axes.col(0) = -axes.col(0);
     for (Vec3& p : place) p = axes.transpose() * (p - mean);
-    for (Face& f : face) f = {axes.transpose() * f.area, axes.transpose() * (f.centre - mean)};
+    for (Face& f : face) f = turned(f, axes, mean);
+    for (Moments* one : {&solid, &cubes}) one->turn(axes);
     weight = solver.eigenvalues().cwiseAbs2();
     weight /= weight.sum();
+  }
+
+ private:
+  static Face turned(const Face& f, const Mat3& axes, const Vec3& mean) {
+    Face out{axes.transpose() * f.area, axes.transpose() * (f.centre - mean), axes.transpose() * f.first * axes, Face::no_moments()};
+    for (Eigen::Index m = 0; m < 3; ++m) {
+      Mat3 sum = Mat3::Zero();
+      for (Eigen::Index n = 0; n < 3; ++n) sum += axes(n, m) * f.second[static_cast<std::size_t>(n)];
+      out.second[static_cast<std::size_t>(m)] = axes.transpose() * sum * axes;
+    }
+    return out;
   }
 };
 
@@ -51,12 +101,12 @@ struct Body {
 struct Load {
   Eigen::Index along;
   Eigen::Index across;  ///< = along: tension
-  [[nodiscard]] double stress(const Vec3& at) const { return across == along ? 1.0 : at[across]; }
-  /// Torque of the stress about the centre of a face, as of a round one.
+  [[nodiscard]] double force(const Face& face) const { return across == along ? face.area[along] : face.centre[across] * face.area[along] + face.first(across, along); }
+  /// Torque of the stress about the centre of a face.
   [[nodiscard]] Vec3 turn(const Face& face) const {
-    if (across == along) return Vec3::Zero();
-    const Vec3 normal = face.area.normalized(), within = Vec3::Unit(across) - normal[across] * normal;
-    return face.area[along] * face.area.norm() / (4.0 * std::numbers::pi) * within.cross(Vec3::Unit(along));
+    if (across == along) return face.first.col(along).cross(Vec3::Unit(along));
+    const Vec3 arm = face.centre[across] * face.first.col(along) + face.second[static_cast<std::size_t>(along)].col(across);
+    return arm.cross(Vec3::Unit(along));
   }
 };
 
@@ -71,7 +121,7 @@ Eigen::VectorXd traction(const Packing& packing, const Body& body, const Load& l
   Eigen::VectorXd out = Eigen::VectorXd::Zero(6 * static_cast<Eigen::Index>(body.place.size()));
   for (std::size_t b = 0; b < body.face.size(); ++b) {
     const Face& face = body.face[b];
-    const Vec3 t = load.stress(face.centre) * face.area[load.along] * Vec3::Unit(load.along);
+    const Vec3 t = load.force(face) * Vec3::Unit(load.along);
     const Vec3 turn = load.turn(face);
     for (const auto& [i, sign] : {std::pair(packing.bond[b][0], -1.0), std::pair(packing.bond[b][1], 1.0)}) {
       out.segment<3>(6 * i) += sign * t;
@@ -103,8 +153,8 @@ Eigen::VectorXd displacement(const Body& body, const Load& load, double nu) {
 
 /// Particles in the middle of a body along an axis: those at its ends take tractions themselves, and are stiffer.
 std::vector<std::size_t> middle_of(const Body& body, Eigen::Index along) {
-  constexpr double kMiddle = 0.6;
   constexpr std::size_t kEnough = 12;
+  constexpr double kMiddle = 0.6;
   double end = 0.0;
   for (const Vec3& p : body.place) end = std::max(end, std::abs(p[along]));
   std::vector<std::size_t> out, all;
@@ -203,7 +253,8 @@ Response response(const Packing& packing, const Body& body, const std::vector<do
     const Eigen::VectorXd force = traction(packing, body, load), moved = solver.solve(force);
     const Eigen::Index kind = load.across == load.along ? 0 : 1;
     const double weight = body.weight[load.along] * (kind == 0 ? 1.0 : 0.5);
-    compliance[kind] += weight * share_of(body, load, displacement(body, load, nu), moved);
+    const double larger = body.solid.section(load.along, load.across) / body.cubes.section(load.along, load.across);
+    compliance[kind] += weight * share_of(body, load, displacement(body, load, nu), moved) * larger;
     const double energy = force.dot(moved), in_outer = moved.dot(outer_matrix * moved);
     if (!(energy > 0.0)) continue;
     out.share(kind, 0) += weight * in_outer / energy;
@@ -215,14 +266,14 @@ Response response(const Packing& packing, const Body& body, const std::vector<do
 
 }  // namespace
 
-std::vector<double> bond_sections(const Packing& packing, double poissons_ratio) {
+std::vector<double> bond_sections(const Mesh& mesh, const Surroundings& lattice, const Packing& packing, double poissons_ratio) {
   constexpr std::size_t kLeast = 8, kMost = 3000;
   constexpr int kIterations = 8;
   constexpr double kTolerance = 1e-3, kLargestStep = 0.5, kLargestFactor = 3.0, kDamping = 1e-3;
   std::vector<double> face;
   for (const Face& f : packing.face) face.push_back(f.area.norm());
   if (packing.particle.size() < kLeast || packing.particle.size() > kMost) return face;
-  const Body body(packing);
+  const Body body(mesh, lattice, packing);
   const std::vector<char> outer = outer_bonds(packing);
   Eigen::Vector2d factor = Eigen::Vector2d::Zero();  // logarithms, of outer and of other bonds
   std::vector<double> section = face;
