@@ -159,9 +159,18 @@ class WayThrough {
     const double near = -reach_of(of_b, -direction), far = reach_of(of_b, direction);
     // From where A's front meets the near side of B to where its back has left it.
     first_ = std::isfinite(near) ? near - front : 0.0;
-    last_ = std::isfinite(far) ? far - back : end_of_growth(front - back);
+    bounded_ = std::isfinite(far);
+    last_ = bounded_ ? far - back : first_ + front - back;
+  }
+
+  /// Energy halfway through B, or as deep in an unbounded one as A is long: near the largest of bodies of simple shape.
+  [[nodiscard]] double probe() const { return energy_at(bounded_ ? 0.5 * (first_ + last_) : last_); }
+
+  /// Finds the end of the way, and the steps of the scan.
+  void measure() {
+    if (!bounded_) last_ = end_of_growth(last_ - first_);
     constexpr int kScan = 12, kMostScan = 48;
-    const double thin = a.field.feature_size() + b.field.feature_size(), wanted = std::ceil(2.0 * (last_ - first_) / thin);
+    const double thin = a_.field.feature_size() + b_.field.feature_size(), wanted = std::ceil(2.0 * (last_ - first_) / thin);
     const int scan = certain_ || !(wanted > kScan) ? kScan : static_cast<int>(std::min<double>(wanted, kMostScan));
     steps_ = scan;
     step_ = (last_ - first_) / scan;
@@ -230,7 +239,7 @@ class WayThrough {
   const ContactBody &a_, &b_;
   Vec3 direction_;
   int cells_;
-  bool certain_;
+  bool certain_, bounded_ = true;
   double first_ = 0.0, last_ = 0.0, step_ = 0.0;
   int steps_ = 0;
 };
@@ -271,12 +280,17 @@ double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& sh
   return column_energy({.a = &a, .b = &b, .shift = shift, .box = box}, along, most);
 }
 
-double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells) {
+double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells, double enough) {
   if (!a.field.surface_box().lower.allFinite() || !a.field.surface_box().upper.allFinite()) {
     SUPPLE_EXPECTS(b.field.surface_box().extent().allFinite());
-    return contact_capacity(b, a, -direction, cells);
+    return contact_capacity(b, a, -direction, cells, enough);
   }
-  const WayThrough way(a, b, direction, std::max(8, cells / 2));
+  WayThrough way(a, b, direction, std::max(8, cells / 2));
+  if (std::isfinite(enough)) {
+    const double on_the_way = way.probe();
+    if (on_the_way > enough) return on_the_way;
+  }
+  way.measure();
   const double at = way.scan();
   const double middle = way.narrow(at);
   const double most = std::max(shifted_energy(a, b, middle * direction, direction, cells), shifted_energy(a, b, at * direction, direction, cells));

@@ -67,29 +67,33 @@ class StepPotential {
     }
   }
 
-  /// Whether the forces that the last `differentiate` left over change the velocity of each particle, turns at a distance of `length`, by at most
-  /// `of_stick` of the speed below which friction on it fades out. Particles that touch nothing pass motion on to those that do.
-  [[nodiscard]] bool leaves_less_than(double of_stick, double length) const {
+  /// The last correction as a change of the velocity of each particle, turns at a distance of `length`, over the speed below which friction on it fades out: the
+  /// largest. Particles that touch nothing pass motion on to those that do.
+  [[nodiscard]] double over_stick_speed(double length) const {
     const std::vector<std::uint32_t>& touched = buffers_.contact.touched();
     const std::vector<double>& stick = buffers_.contact.least_stick_speed();
-    if (touched.empty()) return true;
+    if (touched.empty()) return 0.0;
     const double least = *std::min_element(stick.begin(), stick.end());
+    double largest = 0.0;
     std::size_t t = 0;
     for (std::size_t i = 0; i < set_.size(); ++i) {
       while (t < touched.size() && touched[t] < i) ++t;
       const bool touches = t < touched.size() && touched[t] == i;
-      const double most = of_stick * (touches ? stick[t] : least) / h_;
       const auto row = static_cast<Eigen::Index>(6 * i);
-      const double push2 = (1.0 / set_.mass[i] * buffers_.gradient.segment<3>(row)).squaredNorm();
-      const double spin2 = (buffers_.pose.orientation[i].conjugate() * Vec3(buffers_.gradient.segment<3>(row + 3))).cwiseQuotient(set_.inertia[i]).squaredNorm();
-      if (!(std::max(push2, length * length * spin2) <= most * most)) return false;
+      const double moved = std::max(buffers_.correction.segment<3>(row).norm(), length * buffers_.correction.segment<3>(row + 3).norm());
+      largest = std::max(largest, moved / (touches ? stick[t] : least));
     }
-    return true;
+    return largest / h_;
   }
 
   /// Solves H correction = -gradient. The exact Hessian is taken where it is positive definite.
-  void solve(const IntegratorSettings& settings, const ParticleState& pose, StepReport& report) {
+  /// @param renew  false: with the Hessian of the last call
+  void solve(const IntegratorSettings& settings, const ParticleState& pose, bool renew, StepReport& report) {
     const bool direct = 6 * set_.size() <= static_cast<std::size_t>(settings.direct_unknowns);
+    if (direct && !renew) {
+      buffers_.correction = buffers_.solver.solve(-buffers_.gradient);
+      return;
+    }
     for (const HessianKind kind : {HessianKind::Exact, HessianKind::PositiveSemiDefinite}) {
       if (kind == HessianKind::PositiveSemiDefinite || direct) assemble(pose, kind);
       if (!direct || !buffers_.solver.factorise(buffers_.hessian)) continue;
@@ -188,8 +192,9 @@ void minimise(const IntegratorSettings& settings, double value, StepPotential& p
   constexpr double kRoundOff = 1e-14;    // of the potential
   constexpr double kLargestTurn = 0.5;   // [rad] in one correction
   constexpr int kMostHalvings = 30;
+  constexpr double kKept = 0.1;          // of the correction before
   constexpr int kMostLags = 8;           // times that friction follows the normal forces
-  constexpr double kOfStickSpeed = 5e-3; // velocities at the end of a step tell what holds to a hundredth of the friction
+  constexpr double kOfStickSpeed = 0.01; // Newton leaves about the square of it, in friction too, which pushes what rests
   constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
   report.within_tolerance = false;
   int lags = 0;
@@ -202,21 +207,27 @@ void minimise(const IntegratorSettings& settings, double value, StepPotential& p
     potential.differentiate(buffers.pose);
   };
   begin_at_pose();
+  bool renew = true;
+  double before = 0.0;  // size of the correction before
   for (int iteration = 0; iteration < settings.max_iterations; ++iteration) {
     if ((buffers.gradient.array() == 0.0).all()) {
       report.last_correction = 0.0;
       report.within_tolerance = true;
       return;
     }
-    potential.solve(settings, buffers.pose, report);
+    potential.solve(settings, buffers.pose, renew, report);
     ++report.newton_iterations;
     report.last_correction = size_of(buffers.correction, settings.length);
     if (!std::isfinite(report.last_correction)) return;
+    // The Hessian is kept while corrections fall fast with it. Where bodies touch it changes from pose to pose.
+    renew = !buffers.contact.empty() || (iteration > 0 && report.last_correction > kKept * before);
+    before = report.last_correction;
 
     // The gain of a small correction may be less than the potential's rounding errors.
-    const double slips = buffers.contact.predict_friction(buffers.correction);
+    // Friction is so steep in the slip that forces, and with them velocities, may err where the pose does not.
+    const double slips = std::max(buffers.contact.predict_friction(buffers.correction), potential.over_stick_speed(settings.length));
     const bool small = report.last_correction <= settings.tolerance;
-    const bool sure = small && slips <= kOfStickSpeed;
+    const bool sure = small && (buffers.contact.empty() || (iteration > 0 && slips <= kOfStickSpeed));  // directions of friction are not known before
     const double slope = buffers.gradient.dot(buffers.correction);
     const double angle = largest_angle(buffers.correction);
     double share = angle > kLargestTurn ? kLargestTurn / angle : 1.0;
@@ -224,7 +235,7 @@ void minimise(const IntegratorSettings& settings, double value, StepPotential& p
     double next = value;
     for (int halving = 0; halving < kMostHalvings; ++halving) {
       move(buffers.pose, buffers.correction, share, buffers.trial);
-      if (!sure || !buffers.contact.empty()) next = potential.value(buffers.trial);
+      if (!sure) next = potential.value(buffers.trial);
       found = sure || next <= value + kDescent * share * slope + kRoundOff * std::abs(value);
       if (found) break;
       share *= 0.5;
@@ -234,8 +245,7 @@ void minimise(const IntegratorSettings& settings, double value, StepPotential& p
     std::swap(buffers.pose, buffers.trial);
     value = next;
     begin_at_pose();
-    // Friction is so steep in the slip that forces, and with them velocities, may err where the pose does not.
-    if (small && (buffers.contact.empty() || potential.leaves_less_than(kOfStickSpeed, settings.length) || is_rounding(buffers.correction, buffers.pose))) {
+    if (sure || (small && is_rounding(buffers.correction, buffers.pose))) {
       report.within_tolerance = true;
       return;
     }

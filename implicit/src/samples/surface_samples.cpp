@@ -93,11 +93,8 @@ class BlockProjector {
 
   void project(std::size_t begin, std::size_t end) {
     count_ = 0;
+    clear(begin, end);
     for (std::size_t s = begin; s < end; ++s) {
-      task_.out.point[s] = Vec3::Zero();
-      task_.out.normal[s] = Vec3::Zero();
-      task_.out.area[s] = 0.0;
-      task_.out.valid[s] = 0;
       if (!task_.active.empty() && task_.active[task_.layout.part[s]] == 0) continue;
       const Pose& pose = task_.parts[task_.layout.part[s]];
       const Vec3 origin = pose.to_world(task_.layout.foot[s]), direction = pose.orientation * task_.layout.direction[s];
@@ -112,6 +109,7 @@ class BlockProjector {
       seed.valid = false;
     }
     if (count_ == 0) return;
+    task_.out.written[begin / kBlock] = 1;
     find_exits();
     for (;;) {
       scratch_.open.clear();
@@ -134,6 +132,18 @@ class BlockProjector {
   }
 
  private:
+  void clear(std::size_t begin, std::size_t end) {
+    std::uint8_t& written = task_.out.written[begin / kBlock];
+    if (written == 0) return;
+    for (std::size_t s = begin; s < end; ++s) {
+      task_.out.point[s] = Vec3::Zero();
+      task_.out.normal[s] = Vec3::Zero();
+      task_.out.area[s] = 0.0;
+      task_.out.valid[s] = 0;
+    }
+    written = 0;
+  }
+
   void evaluate(std::size_t n) {
     scratch_.values.resize(n);
     scratch_.gradients.resize(n);
@@ -312,10 +322,14 @@ void sample_surface(const SampledBody& body, const SampledRegion& region, const 
   SUPPLE_EXPECTS(region.active.empty() || region.active.size() == body.parts.size());
   const std::size_t n = body.layout.size();
   if (state.distance.size() != n) state.distance.assign(n, -1.0);
-  out.point.resize(n);
-  out.normal.resize(n);
-  out.area.resize(n);
-  out.valid.resize(n);
+  const std::size_t blocks = (n + kBlock - 1) / kBlock;
+  if (out.point.size() != n || out.written.size() != blocks) {
+    out.point.assign(n, Vec3::Zero());
+    out.normal.assign(n, Vec3::Zero());
+    out.area.assign(n, 0.0);
+    out.valid.assign(n, 0);
+    out.written.assign(blocks, 0);
+  }
   const Task task{body.skeleton, body.layout, body.parts, body.field, region.active, region.near, state, out};
   struct Job {
     const Task& task;

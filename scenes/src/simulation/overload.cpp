@@ -111,10 +111,10 @@ std::optional<RunRecord::Overload> OverloadWatch::look(const StageContext& conte
     return energy_of_approach(approach.speed, 1.0 / mass_of(context, s.bodies.a) + 1.0 / mass_of(context, s.bodies.b));
   };
   constexpr double kSafety = 0.45;  // of a coarse capacity, where half is the bound
-  const auto suspicious = [&](const collision::ContactSurface::Summary& s, double kinetic, double coarse) {
-    // A lens whose pressure falls to zero at its faces holds a sixth of largest pressure x area x thickness, a paraboloid's
-    // too; a fourth is on the safe side.
-    return kinetic + 0.25 * s.largest_pressure * s.area * s.largest_overlap > kSafety * coarse;
+  // A lens whose pressure falls to zero at its faces holds a sixth of largest pressure x area x thickness, a paraboloid's
+  // too; a fourth is on the safe side.
+  const auto at_most = [](const collision::ContactSurface::Summary& s, double kinetic) {
+    return kinetic + 0.25 * s.largest_pressure * s.area * s.largest_overlap;
   };
   looked_at_.resize(summary.size());
   constexpr std::size_t kBlock = 64;
@@ -125,7 +125,7 @@ std::optional<RunRecord::Overload> OverloadWatch::look(const StageContext& conte
       if (!(s.force.norm() > 0.0)) continue;
       const auto known = capacity_.find(kinds_of(context, s.bodies));
       looked_at_[k] = known == capacity_.end() ||
-                      suspicious(s, kinetic_energy(s, collision::measure_approach(frame.bodies, s)), known->second);
+                      at_most(s, kinetic_energy(s, collision::measure_approach(frame.bodies, s))) > kSafety * known->second.energy;
     }
   });
   std::optional<RunRecord::Overload> passing;
@@ -135,13 +135,15 @@ std::optional<RunRecord::Overload> OverloadWatch::look(const StageContext& conte
     const collision::ContactSurface::Summary& s = summary[k];
     const collision::Approach approach = collision::measure_approach(frame.bodies, s);
     const double kinetic = kinetic_energy(s, approach);
-    const auto [place, fresh] = capacity_.try_emplace(kinds_of(context, s.bodies), 0.0);
-    if (fresh) {
-      place->second = collision::contact_capacity(frame.bodies[s.bodies.a], frame.bodies[s.bodies.b], approach.normal, kCoarseCells);
-    }
-    const double coarse = place->second;
-    if (!suspicious(s, kinetic, coarse)) continue;
     const collision::ContactBody &a = frame.bodies[s.bodies.a], &b = frame.bodies[s.bodies.b];
+    const double enough = at_most(s, kinetic) / kSafety;
+    Capacity& known = capacity_[kinds_of(context, s.bodies)];
+    if (!known.whole && !(known.energy > enough)) {
+      known.energy = collision::contact_capacity(a, b, approach.normal, kCoarseCells, enough);
+      known.whole = !(known.energy > enough);
+    }
+    const double coarse = known.energy;
+    if (!(at_most(s, kinetic) > kSafety * coarse)) continue;
     const double pressed = collision::shifted_energy(a, b, Vec3::Zero(), approach.normal, kCoarseCells);
     if (!(kinetic + pressed > kSafety * coarse)) continue;
     double& worst = worst_[s.bodies];

@@ -30,7 +30,12 @@ class OverloadWatch {
   [[nodiscard]] static collision::BodyPair kinds_of(const StageContext& context, const collision::BodyPair& pair);
 
   std::vector<std::uint8_t> looked_at_;  // 1: a pair whose energy is near its capacity, or a new pair
-  std::map<collision::BodyPair, double> capacity_;  ///< measured when the pair, or an equivalent one, was first in contact [J]
+  /// Coarse, of a pair.
+  struct Capacity {
+    double energy = 0.0;  ///< [J]
+    bool whole = false;   ///< false: `energy` is a lower bound
+  };
+  std::map<collision::BodyPair, Capacity> capacity_;  ///< a lower bound is measured when the pair, or an equivalent one, is first in contact
   std::map<collision::BodyPair, double> worst_;     ///< energy when the capacity was last measured [J]
 };
 

@@ -2,6 +2,7 @@
 /// How hard two bodies come together, what their pair can hold, and hard cores that turn back what comes too deep.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -37,8 +38,10 @@ struct Approach {
 /// U_max: the largest contact energy [J] that the pair can reach when A is moved into B along `direction` (unit) until it
 /// is through, or for an unbounded B, as deep as it still grows; not less than the energy where they are. What approaches with more kinetic energy passes,
 /// if B has another side.
-/// Two equal linear balls of pressure E (1 - r/R) hold pi E R^3 / 3. @param cells  see `shifted_energy`
-[[nodiscard]] double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells = 32);
+/// Two equal linear balls of pressure E (1 - r/R) hold pi E R^3 / 3. @param cells  see `shifted_energy` @param enough  [J]: a result above it may be any
+/// energy on the way, which the capacity is not less than
+[[nodiscard]] double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells = 32,
+                                      double enough = std::numeric_limits<double>::infinity());
 
 /// Share of the core pressure beyond which a core turns back what still approaches.
 inline constexpr double kCoreShare = 0.5;

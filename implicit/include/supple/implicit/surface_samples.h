@@ -58,6 +58,7 @@ struct SurfaceSamples {
   std::vector<Vec3> normal;          ///< unit, outward
   std::vector<double> area;          ///< [m^2]; sums to the surface area as spacing -> 0; 0 where invalid
   std::vector<std::uint8_t> valid;   ///< 1: on the surface and in its own territory
+  std::vector<std::uint8_t> written; ///< 1: of a block of seeds some were projected by the last call; the other entries of the block are 0
   std::uint64_t visited = 0;         ///< seeds re-projected by the last call
   std::uint64_t failures = 0;        ///< seeds without a root
 };
