@@ -168,6 +168,47 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   return coarse || off <= kSafety * (kept_.summary.error_estimate + out.summary.error_estimate);
 }
 
+/// What the imprints of `third_bodies_` take of the patches, as in ContactSettings::error. @return nothing where that is not known, or more than `most`
+std::optional<double> PairSolver::taken_by_imprints(const Job& job, double most, const PairResult& out) {
+  constexpr double kSafety = 1.5;
+  double area = 0.0, force = 0.0;
+  for (const ContactBody* const third : third_bodies_) {
+    if (!third->field.convex()) return std::nullopt;  // it may have several imprints on a patch
+    for (const PolarCover& cover : patches_.covers()) {
+      const std::optional<Vec3> inside = imprint_.find(job.polar.pressure, cover, *third, 0.0);
+      if (!inside) continue;
+      const std::optional<ImprintSize> size = imprint_.measure(job.polar.pressure, cover, *third, *inside);
+      if (!size) return std::nullopt;
+      area += kSafety * size->share;
+      force += kSafety * size->share * size->pressure * out.summary.area / out.load;
+      if (!(std::max(area, force) <= most)) return std::nullopt;
+    }
+  }
+  return std::max(area, force);
+}
+
+/// Whether imprints are so small that the patches stay within the given error as they are, or solved a little finer. The estimate grows by what imprints take.
+bool PairSolver::may_leave_imprints(const Job& job, PairResult& out) {
+  constexpr double kMost = 0.8;  // of the error: finer patches cost more than cut ones
+  const double error = job.settings().error;
+  if (!(out.load > 0.0)) return false;
+  const std::optional<double> taken = taken_by_imprints(job, kMost * error, out);
+  if (!taken) return false;
+  if (out.summary.error_estimate + *taken > error) {
+    PolarJob finer = job.polar;
+    finer.settings.error = error - *taken;
+    out.clear();
+    if (!rings(finer, job.overlap, job.convex, out) || out.summary.error_estimate + *taken > error) {
+      out.clear();
+      rings(job.polar, job.overlap, job.convex, out);
+      return false;
+    }
+    out.summary.rule = ContactRule::Polar;
+  }
+  out.summary.error_estimate += *taken;
+  return true;
+}
+
 /// The third bodies that reach the overlap.
 void PairSolver::take_all_thirds(const Job& job) {
   third_bodies_.clear();
@@ -390,7 +431,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
       out.clear();
       return;
     }
-    if (pressing == Pressing::Some) {
+    if (pressing == Pressing::Some && !may_leave_imprints(job, out)) {
       fits = polar_cut(job, out);
       if (!fits && any) reason = RuleReason::ThirdBody;
     }

@@ -67,6 +67,8 @@ class PairSolver {
   bool imprints_cut(const Job& job, PairResult& out);
   bool stars_cut(const Job& job, double asked, PairResult& out);
   bool polar_cut(const Job& job, PairResult& out);
+  std::optional<double> taken_by_imprints(const Job& job, double most, const PairResult& out);
+  bool may_leave_imprints(const Job& job, PairResult& out);
   bool march(const Job& job, PairResult& out);
   bool panels(const Job& job, PairResult& out);
   bool march_instead(const Job& job, PairResult& out);

@@ -9,6 +9,8 @@ namespace supple::implicit {
 
 /// Whether the stretch [0, reach] of a ray meets the box.
 [[nodiscard]] inline bool ray_meets(const Box& box, const Vec3& from, const Vec3& along, double reach) {
+  const Vec3 to = from + reach * along;
+  if ((from.cwiseMax(to).array() < box.lower.array()).any() || (from.cwiseMin(to).array() > box.upper.array()).any()) return false;
   double low = 0.0, high = reach;
   for (int k = 0; k < 3; ++k) {
     if (along[k] == 0.0) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <limits>
 #include <numbers>
 
@@ -288,32 +289,60 @@ std::optional<Vec2> ImprintFinder::touch_between(PairPressure& pressure, const P
   return spot.at;
 }
 
-bool ImprintFinder::trace(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Vec3& inside, Imprint& out) {
-  const PeakFrame& frame = cover.frame;
-  const double radius = (cover.rim.front() - frame.origin).norm();
+ImprintFinder::Spot ImprintFinder::centre_at(const PeakFrame& frame, const Vec3& inside) {
   const Vec3 from = inside - frame.origin;
   Spot centre;
   centre.at = in_units(frame, from);
   centre.height = from.dot(frame.axis);
-  double first = kFirst * radius;
-  for (const std::size_t n : {kFewRays, kRays}) {
-    way_.clear();
-    for (std::size_t k = 0; k < n; ++k) way_.push_back(direction(frame, static_cast<double>(k) / static_cast<double>(n)));
-    radius_.assign(n, first);
-    if (!follow_border(pressure, frame, body, centre, n == kRays ? kFine : kRough, kFarthest * radius)) return false;
-    if (n == kRays) break;
-    double area = 0.0;
-    Vec2 middle = Vec2::Zero();
-    first = 0.0;
-    for (std::size_t k = 0; k < n; ++k) {
-      const Vec2 a = radius_[k] * way_[k], b = radius_[(k + 1) % n] * way_[(k + 1) % n];
-      area += cross(a, b);
-      middle += cross(a, b) / 3.0 * (a + b);
-      first += radius_[k] / static_cast<double>(n);
-    }
-    const Spot better = look(pressure, frame, body, centre.at + middle / area, centre.height);
-    if (better.least() > 0.0) centre = better;
+  return centre;
+}
+
+/// The border along so many ways from the centre, finely along `kRays`. @param first  distance to begin at [m]
+bool ImprintFinder::send_ways(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Spot& centre, std::size_t ways, double first) {
+  const PeakFrame& frame = cover.frame;
+  way_.clear();
+  for (std::size_t k = 0; k < ways; ++k) way_.push_back(direction(frame, static_cast<double>(k) / static_cast<double>(ways)));
+  radius_.assign(ways, first);
+  return follow_border(pressure, frame, body, centre, ways == kRays ? kFine : kRough, kFarthest * (cover.rim.front() - frame.origin).norm());
+}
+
+/// From the ends of the ways. @return twice the area within, in units of u and v
+double ImprintFinder::move_to_middle(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, Spot& centre) {
+  const std::size_t n = way_.size();
+  double area = 0.0;
+  Vec2 middle = Vec2::Zero();
+  for (std::size_t k = 0; k < n; ++k) {
+    const Vec2 a = radius_[k] * way_[k], b = radius_[(k + 1) % n] * way_[(k + 1) % n];
+    area += cross(a, b);
+    middle += cross(a, b) / 3.0 * (a + b);
   }
+  const Spot better = look(pressure, frame, body, centre.at + middle / area, centre.height);
+  if (better.least() > 0.0) centre = better;
+  return area;
+}
+
+std::optional<ImprintSize> ImprintFinder::measure(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Vec3& inside) {
+  const PeakFrame& frame = cover.frame;
+  Spot centre = centre_at(frame, inside);
+  double whole = 0.0;
+  for (std::size_t k = 0; k < cover.rim.size(); ++k) {
+    whole += cross(in_units(frame, cover.rim[k] - frame.origin), in_units(frame, cover.rim[(k + 1) % cover.rim.size()] - frame.origin));
+  }
+  if (!(whole > 0.0) || !send_ways(pressure, cover, body, centre, kFewRays, kFirst * (cover.rim.front() - frame.origin).norm())) return std::nullopt;
+  ImprintSize size;
+  for (const Spot& spot : spots_) size.pressure = std::max(size.pressure, spot.p);
+  size.share = move_to_middle(pressure, frame, body, centre) / whole;
+  size.pressure = std::max(size.pressure, centre.p);
+  return size;
+}
+
+bool ImprintFinder::trace(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Vec3& inside, Imprint& out) {
+  const PeakFrame& frame = cover.frame;
+  Spot centre = centre_at(frame, inside);
+  if (!send_ways(pressure, cover, body, centre, kFewRays, kFirst * (cover.rim.front() - frame.origin).norm())) return false;
+  const double first = std::accumulate(radius_.begin(), radius_.end(), 0.0) / static_cast<double>(radius_.size());
+  move_to_middle(pressure, frame, body, centre);
+  if (!send_ways(pressure, cover, body, centre, kRays, first)) return false;
   out.border.clear();
   out.touches.clear();
   out.leaves.clear();

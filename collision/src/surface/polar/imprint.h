@@ -21,6 +21,12 @@ struct Imprint {
   [[nodiscard]] std::optional<double> middle_on(const Vec2& way) const;
 };
 
+/// How large an imprint is, to about a tenth.
+struct ImprintSize {
+  double share = 0.0;     ///< of the area of the patch
+  double pressure = 0.0;  ///< largest of the pair at its border and its middle [Pa]
+};
+
 class ImprintFinder {
  public:
   /// A place of the patch where a body's pressure is positive and above that of the pair less `margin` [Pa].
@@ -28,6 +34,8 @@ class ImprintFinder {
   std::optional<Vec3> find(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, double margin);
   /// The border as seen from a place within. @return false where it does not end near the patch
   bool trace(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Vec3& inside, Imprint& out);
+  /// The size of the imprint around a place within. @return nothing where its border does not end near the patch
+  std::optional<ImprintSize> measure(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Vec3& inside);
   /// How much harder than the pair the body presses where Sigma is met along the axis, and that height.
   std::array<double, 2> excess_at(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Vec2& at, double height) {
     const Spot spot = look(pressure, frame, body, at, height);
@@ -55,6 +63,9 @@ class ImprintFinder {
   Spot look(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Vec2& at, double height);
   void begin_on_grid(PairPressure& pressure, const PolarCover& cover, const ContactBody& body);
   bool begin_at_core(PairPressure& pressure, const PolarCover& cover, const ContactBody& body);
+  static Spot centre_at(const PeakFrame& frame, const Vec3& inside);
+  bool send_ways(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Spot& centre, std::size_t ways, double first);
+  double move_to_middle(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, Spot& centre);
   bool follow_border(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, const Spot& centre, double enough, double farthest);
   /// A piece of the border, between two of its points, as seen from the centre.
   struct Piece {
