@@ -170,7 +170,7 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
 
 /// What the imprints of `third_bodies_` take of the patches, as in ContactSettings::error. @return nothing where that is not known, or more than `most`
 std::optional<double> PairSolver::taken_by_imprints(const Job& job, double most, const PairResult& out) {
-  constexpr double kSafety = 1.5;
+  constexpr double kSafety = 1.25;  // sizes are good to a tenth
   double area = 0.0, force = 0.0;
   for (const ContactBody* const third : third_bodies_) {
     if (!third->field.convex()) return std::nullopt;  // it may have several imprints on a patch

@@ -187,6 +187,33 @@ TEST(Panels, AreCutWhereAThirdBodyPressesHarder) {
   }
 }
 
+struct ConvexSphere : LinearSphere {
+  [[nodiscard]] bool convex() const { return true; }
+};
+
+/// Of three balls whose middle planes are known: of the pair's disc of radius a the third body takes the segment x > x0.
+TEST(Imprints, ThatTakeLessThanTheErrorLeaveThePatchAsItIs) {
+  constexpr double h = 0.9, x0 = 0.425;
+  const double a2 = 1.0 - h * h, d = x0 + std::sqrt(x0 * x0 + h * h);  // on z = 0 the third ball presses harder where 2 x d > d^2 - h^2
+  const double half = std::acos(x0 / std::sqrt(a2)), whole = std::numbers::pi * a2, segment = a2 * half - x0 * std::sqrt(a2 - x0 * x0);
+  ASSERT_GT(segment, 2e-3 * whole);
+  const ConvexSphere upper{{Vec3(0.0, 0.0, h), {}}}, lower{{Vec3(0.0, 0.0, -h), {}}}, third{{Vec3(d, 0.0, 0.0), {}}};
+  Stage stage;
+  for (const ConvexSphere* ball : {&upper, &lower, &third}) stage.add(*ball, {ball->centre});
+  const auto solve = [&](double asked) {
+    const ContactSurface::Summary s = stage.solve({.error = asked}).summary.at(0);
+    EXPECT_EQ(s.bodies, (BodyPair{0, 1}));
+    EXPECT_LE(s.error_estimate, asked);
+    EXPECT_NEAR(s.area, whole - segment, s.error_estimate * whole) << asked;
+    return s;
+  };
+  const ContactSurface::Summary left = solve(1e-2), cut = solve(1e-3);
+  EXPECT_NEAR(left.area, whole, 1e-3 * whole);
+  EXPECT_GT(left.error_estimate, segment / whole);
+  EXPECT_LT(cut.area, whole - 0.5 * segment);
+  EXPECT_LT(left.points, cut.points);
+}
+
 /// A ball, a capsule and a ball with a soft rim in one place: the pair of the first two keeps a sliver of their Sigma. The force was found by columns through
 /// the squeezed region, and by marching to 1e-8, to the digits given.
 TEST(Panels, OfASliverBesideAThirdBodyAreAsGoodAsAsked) {

@@ -322,17 +322,37 @@ double ImprintFinder::move_to_middle(PairPressure& pressure, const PeakFrame& fr
 }
 
 std::optional<ImprintSize> ImprintFinder::measure(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Vec3& inside) {
+  constexpr std::size_t kAxes = 4, kAround = 8;
   const PeakFrame& frame = cover.frame;
-  Spot centre = centre_at(frame, inside);
+  const double lu = frame.u.norm(), lv = frame.v.norm(), radius = (cover.rim.front() - frame.origin).norm();
   double whole = 0.0;
   for (std::size_t k = 0; k < cover.rim.size(); ++k) {
     whole += cross(in_units(frame, cover.rim[k] - frame.origin), in_units(frame, cover.rim[(k + 1) % cover.rim.size()] - frame.origin));
   }
-  if (!(whole > 0.0) || !send_ways(pressure, cover, body, centre, kFewRays, kFirst * (cover.rim.front() - frame.origin).norm())) return std::nullopt;
+  if (!(whole > 0.0)) return std::nullopt;
+  Spot centre = centre_at(frame, inside);
+  centre = look(pressure, frame, body, centre.at, centre.height);
+  // Beside a rim imprints are long across the slope of the excess: ways are stretched as they are.
+  const Vec2 up = Vec2(centre.rise.x() / lu, centre.rise.y() / lv).normalized(), across(-up.y(), up.x());
+  std::array<double, 2> half{1.0, 1.0};
   ImprintSize size;
-  for (const Spot& spot : spots_) size.pressure = std::max(size.pressure, spot.p);
-  size.share = move_to_middle(pressure, frame, body, centre) / whole;
-  size.pressure = std::max(size.pressure, centre.p);
+  for (const std::size_t n : {kAxes, kAround}) {
+    way_.clear();
+    radius_.clear();
+    for (std::size_t k = 0; k < n; ++k) {
+      const double angle = 2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(n);
+      const auto [sine, cosine] = math::sin_cos(angle);
+      const Vec2 to = half[0] * cosine * up + half[1] * sine * across;
+      const Vec2 way = to.normalized();
+      way_.emplace_back(way.x() / lu, way.y() / lv);
+      radius_.push_back(n == kAxes ? kFirst * radius : to.norm());
+    }
+    if (!follow_border(pressure, frame, body, centre, kRough, kFarthest * radius)) return std::nullopt;
+    for (const Spot& spot : spots_) size.pressure = std::max(size.pressure, spot.p);
+    half = {0.5 * (radius_[0] + radius_[n / 2]), 0.5 * (radius_[n / 4] + radius_[3 * n / 4])};
+    size.share = move_to_middle(pressure, frame, body, centre) / whole;
+    size.pressure = std::max(size.pressure, centre.p);
+  }
   return size;
 }
 
