@@ -326,6 +326,26 @@ ground: {height: 0, friction: 0.5}
   EXPECT_LT(late, 2.0 * brief);
 }
 
+TEST(StageErrors, OfTimeAreNoMoreThanTheWayThatIsLeft) {
+  // The block falls by a centimetre and rests for nine seconds, in which differences of its last vibrations would drift by three.
+  const nlohmann::json errors = errors_of(R"(
+schema: 1
+duration: 10 s
+frame_rate: 24
+gravity: [0, 0, -9.81]
+integrator: {method: implicit}
+accuracy: 1e-2
+objects:
+  - name: block
+    particles: {at: [0, 0, 0.047], mass: 0.1, inertia_radius: 0.03}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.1}}]
+    contact: {modulus: 1e4, dissipation: 3}
+ground: {height: 0, modulus: 1e9}
+)").at("errors").at("time");
+  EXPECT_GT(errors.at("position_m").get<double>(), 0.0);
+  EXPECT_LT(errors.at("position_m").get<double>(), 0.01);
+}
+
 TEST(StageErrors, NameTheLargestAndWhatFrictionIsBlurredBy) {
   const nlohmann::json blurred = errors_of(ball("accuracy: 1e-2\nintegrator: {method: symplectic}\ntime_step: {substeps: 64}", 0.5));
   EXPECT_EQ(blurred.at("errors").at("largest"), "time");

@@ -99,11 +99,12 @@ void StageErrorEstimator::compare(const Simulation& simulation, const Change& ch
   ++variant.frames[kind_];
 }
 
-/// A difference of velocities lasts as long as the motion itself: until the end where the object keeps its speed, less where it comes to rest.
+/// A difference of velocities lasts as long as the motion itself: until the end where the object keeps its speed, less where it comes to rest. It displaces the
+/// object by no more than the way that is left.
 double StageErrorEstimator::displacement(const Difference& found, std::size_t object) const {
   const double path = path_[object] - found.path;
   const double lasts = found.speed * found.left > path ? path / found.speed : found.left;
-  return found.apart + lasts * found.velocity;
+  return found.apart + std::min(lasts * found.velocity, path);
 }
 
 /// Sums are scaled from the frames that were simulated again to all frames of their kind.
