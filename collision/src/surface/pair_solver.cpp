@@ -15,6 +15,10 @@
 namespace supple::collision {
 namespace {
 
+/// What flows through what third bodies leave of Sigma is shared out among pairs in another way than the energy of the space that they lose: both are right in
+/// their sums, but do not mix. Errors finer than this are met where all pairs tell the former.
+constexpr double kAllFlow = 1e-7;
+
 /// Whether a body is convex and certainly does not reach a box: cheaper than bounds of its field.
 bool clear_of(const ContactBody& body, const Box& box) {
   const std::optional<implicit::CorePoint> core = body.field.core_point(box.centre());
@@ -401,6 +405,7 @@ bool PairSolver::suits_panels(const Job& job) const {
 void PairSolver::choose(const Job& job, PairResult& out) {
   const ContactRule only = job.settings().only;
   const bool any = only == ContactRule::None;
+  cut_by_thirds_ = !third_.empty();
   if (only == ContactRule::Panels) {
     if (!panels(job, out)) {
       begin_anew(job, out);
@@ -427,11 +432,13 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   if (fits && !patches_.empty()) {
     out.summary.rule = ContactRule::Polar;
     const Pressing pressing = third_.empty() ? Pressing::None : thirds_press(job, out);
+    cut_by_thirds_ = false;
     if (pressing == Pressing::All) {
-      out.clear();
+      fill_beyond_thirds(job, out);
       return;
     }
     if (pressing == Pressing::Some && !may_leave_imprints(job, out)) {
+      cut_by_thirds_ = true;
       fits = polar_cut(job, out);
       if (!fits && any) reason = RuleReason::ThirdBody;
     }
@@ -461,7 +468,8 @@ void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
   const double error = region_error(job.settings());
   PatchPoints& points = out.points;
   const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, error);
-  for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || points.unsure[side]);
+  const bool cut = job.settings().energy && cut_by_thirds_ && job.settings().error >= kAllFlow;
+  for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || cut || points.unsure[side]);
   if (points.point.empty() || !(points.unsure[0] || points.unsure[1])) return;
   take_all_thirds(job);
   const auto peak = static_cast<std::size_t>(std::max_element(points.pressure.begin(), points.pressure.end()) - points.pressure.begin());
@@ -469,6 +477,20 @@ void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
     if (!points.unsure[side]) continue;
     points.drop_region(side);
     region_.fill({job.polar.pressure, side, third_bodies_, error}, job.overlap, points.normal[peak], points);
+  }
+}
+
+/// Where third bodies press harder on all of Sigma: what the bodies lose to each other beside them.
+void PairSolver::fill_beyond_thirds(const Job& job, PairResult& out) {
+  const auto peak = static_cast<std::size_t>(std::max_element(out.points.pressure.begin(), out.points.pressure.end()) - out.points.pressure.begin());
+  const Vec3 across = out.points.normal[peak];
+  out.clear();
+  out.summary.reason = RuleReason::ThirdBody;
+  if (!job.settings().energy || job.settings().error < kAllFlow) return;
+  take_all_thirds(job);
+  for (const int side : {0, 1}) {
+    if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None) continue;
+    region_.fill({job.polar.pressure, side, third_bodies_, region_error(job.settings())}, job.overlap, across, out.points);
   }
 }
 

@@ -79,6 +79,7 @@ class PairSolver {
   void begin_anew(const Job& job, PairResult& out);
   static double region_error(const ContactSettings& settings);
   void fill_unsure_regions(const Job& job, PairResult& out);
+  void fill_beyond_thirds(const Job& job, PairResult& out);
   static bool may_lie_within(const Job& job, int side);
   void fill_within(const Job& job, bool equal, std::optional<int> softer, PairResult& out);
   template <class Rule, class Solve>
@@ -104,6 +105,7 @@ class PairSolver {
   std::vector<double> value_;
   std::vector<Vec3> rim_;
   std::vector<std::uint8_t> taken_;  ///< of points and rims, 1: a third body presses harder
+  bool cut_by_thirds_ = false;       ///< a third body may press harder on a part of Sigma
   PairResult kept_;  ///< what another rule has left
 };
 

@@ -25,7 +25,7 @@ enum class RuleReason : std::uint8_t {
   Asked,       ///< `ContactSettings::only`
   Fits,        ///< polar: every patch is seen whole from its peak
   NoGraph,     ///< not polar: a patch is no graph over a disc, or has no peak
-  ThirdBody,   ///< not polar: a third body presses on a patch of bodies with several parts, or cuts it badly
+  ThirdBody,   ///< not polar: a third body presses on a patch of bodies with several parts, cuts it badly, or presses harder on all of Sigma
   Unmet,       ///< not polar: it fits, but marching has the smaller estimate
   ManyHills,   ///< panels: the pressure has more hills than it pays to look at one by one, or a wide patch lies on many primitives
   Within,      ///< no rule: one body lies in the other, which presses harder all over, or as hard: an energy without Sigma and force
