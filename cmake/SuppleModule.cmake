@@ -23,6 +23,14 @@ endif()
 if(SUPPLE_WARNINGS_AS_ERRORS AND NOT SUPPLE_SANITIZE)  # what sanitizers add leads GCC to false alarms
   target_compile_options(supple_flags INTERFACE -Werror)
 endif()
+# These checks take half of the compiler's time, of GCC more; the address sanitizer finds the faults of the first two, and
+# scripts/check_all.sh sanitizers runs all of them with clang.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(supple_quick_sanitizers ON)
+else()
+  set(supple_quick_sanitizers OFF)
+endif()
+option(SUPPLE_QUICK_SANITIZERS "Sanitizers without the checks of null pointers, sizes of objects and alignment" ${supple_quick_sanitizers})
 if(SUPPLE_SANITIZE)
   list(JOIN SUPPLE_SANITIZE "," supple_sanitizers)
   # Reports need line numbers only; full debug information takes a quarter of the build.
@@ -30,9 +38,7 @@ if(SUPPLE_SANITIZE)
   target_link_options(supple_flags INTERFACE -fsanitize=${supple_sanitizers})
   if(supple_sanitizers MATCHES "undefined")
     target_compile_options(supple_flags INTERFACE -fno-sanitize-recover=undefined)
-    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-      # GCC takes two to three times as long with these; the address sanitizer finds the faults of the first two,
-      # and scripts/check_all.sh sanitizers runs all of them with clang.
+    if(SUPPLE_QUICK_SANITIZERS)
       target_compile_options(supple_flags INTERFACE -fno-sanitize=null,object-size,alignment)
     endif()
   endif()
@@ -102,11 +108,30 @@ function(supple_together)
   endforeach()
 endfunction()
 
+# Modules that are taken from another build instead of being compiled: what a fuzz target calls beyond the code that reads its input.
+set(SUPPLE_BUILT_MODULES "" CACHE STRING "Modules to take from the build SUPPLE_BUILT_IN, which has static libraries of the same source")
+set(SUPPLE_BUILT_IN "" CACHE PATH "A build folder")
+# supple_built(NAME SOURCES LIBRARIES): the library of a module as the other build has it, and what stands for its sources here.
+function(supple_built name sources libraries)
+  set(file ${SUPPLE_BUILT_IN}/${name}/libsupple_${name}.a)
+  if(NOT EXISTS ${file})
+    message(FATAL_ERROR "SUPPLE_BUILT_IN: expected ${file}; build the module there first")
+  endif()
+  add_library(supple_${name}_built STATIC IMPORTED GLOBAL)
+  set_target_properties(supple_${name}_built PROPERTIES IMPORTED_LOCATION ${file} INTERFACE_LINK_LIBRARIES "${libraries}")
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}_built.cpp CONTENT "// Nothing: the library is that of another build.\n")
+  set(${sources} ${CMAKE_CURRENT_BINARY_DIR}/${name}_built.cpp PARENT_SCOPE)
+endfunction()
+
 # supple_module(NAME [OWN_OPTIONS] HEADERS h... SOURCES s... [PUBLIC targets] [PRIVATE targets])
 # HEADERS are relative to include/supple/NAME. OWN_OPTIONS: the module has compile options of its own, so it shares no precompiled headers.
 function(supple_module name)
   cmake_parse_arguments(arg "OWN_OPTIONS" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
   set(target supple_${name})
+  if(name IN_LIST SUPPLE_BUILT_MODULES)
+    supple_built(${name} arg_SOURCES "${arg_PUBLIC};${arg_PRIVATE}")
+    list(PREPEND arg_PRIVATE supple_${name}_built)
+  endif()
   add_library(${target} ${arg_SOURCES})
   add_library(supple::${name} ALIAS ${target})
   list(TRANSFORM arg_HEADERS PREPEND "include/supple/${name}/")

@@ -6,7 +6,7 @@ supple_together(
    src/model/arrangement.cpp src/model/crowded_start.cpp"
   "src/file/fields_reference.cpp src/file/limits.cpp src/file/read_scene_archive.cpp src/file/yaml_tree.cpp
    src/model/divide.cpp src/model/led_pins.cpp src/simulation/friction_watch.cpp"
-  "src/file/scene_keys.cpp src/model/inspect.cpp src/model/model_laws.cpp src/model/model_volume.cpp"
+  "src/file/scene_keys.cpp src/file/short_keys.cpp src/model/inspect.cpp src/model/model_laws.cpp src/model/model_volume.cpp"
   "src/model/material.cpp src/model/model_contact.cpp src/output/files/animation_parts.cpp"
   "src/model/model.cpp src/model/point_tree.cpp src/model/time_steps.cpp src/output/files/folder_lock.cpp
    src/output/files/frame_tables.cpp src/output/files/gltf.cpp"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything a change must pass: optimised build and tests, the tests under address and undefined-behaviour
-# sanitizers, the fuzz targets of meshes, tables and pictures for a minute each, a minimal external project on the installed package, and a small film from
+# sanitizers, the fuzz targets for a minute each, a minimal external project on the installed package, and a small film from
 # end to end.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -45,8 +45,8 @@ if part "build (sanitizers)" "$logs/build_asan.log" configure_and_build asan all
 else
   skip_part "tests (sanitizers)" "no build"
 fi
-if part "build (fuzz targets)" "$logs/build_fuzz.log" configure_and_build asan_clang fuzz_files; then
-  part "fuzz targets" "$logs/fuzz.log" run_tests fuzz_files || true
+if part "build (fuzz targets)" "$logs/build_fuzz.log" configure_and_build fuzz fuzz; then
+  part "fuzz targets" "$logs/fuzz.log" run_tests fuzz || true
 else
   skip_part "fuzz targets" "no build"
 fi

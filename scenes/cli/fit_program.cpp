@@ -3,6 +3,9 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "fit.h"
 #include "fit_picture.h"
@@ -19,6 +22,24 @@ using namespace supple;
 using tool::print;
 namespace fs = std::filesystem;
 
+/// A scene of one object that is made for its material. Its faults are those of the option, or of the file that the option names.
+scenes::Scene parsed_material(const std::string& text, const fs::path& folder) {
+  constexpr std::string_view kOption = "--material", kObject = "objects[0].";
+  try {
+    return scenes::parse_scene(text, std::string(kOption), folder);
+  } catch (const Error& error) {
+    std::vector<Fault> faults = error.faults();
+    for (Fault& fault : faults) {
+      if (fault.key.starts_with(kObject)) fault.key.erase(0, kObject.size());
+      if (!fault.place.starts_with(kOption)) continue;  // of the file
+      fault.place = kOption;
+      if (fault.key == "material") fault.expected = "expected the name of a material, or a file of scenes with the key 'material'";
+      fault.key.clear();
+    }
+    throw Error(error.kind(), std::move(faults));
+  }
+}
+
 /// The material of a file of scenes, or a shipped one by its name: read like that of an object.
 fit::Substance material_of(const std::string& given) {
   if (given.empty()) return {};
@@ -28,7 +49,7 @@ fit::Substance material_of(const std::string& given) {
   const std::string text = std::string("schema: 1\nduration: 1\n") + (named ? "include: supple:materials\n" : "") + "objects:\n  - " +
                            (named ? "material: " + quoted(given) : "include: " + quoted(file.filename().string())) +
                            "\n    name: fitted\n    particles: {arrange: single}\n    skeleton: [{shape: point, kernel: {radius: 1}}]\n";
-  const scenes::Scene scene = scenes::parse_scene(text, "--material " + given, file.has_parent_path() ? file.parent_path() : fs::path("."));
+  const scenes::Scene scene = parsed_material(text, file.parent_path());
   const auto& found = scene.objects.front().material;
   if (!found) throw Error(ErrorKind::Scene, Fault{.place = given, .key = "material", .expected = "expected the key 'material'", .found = "none", .hint = "write material: {youngs_modulus: 20 kPa, density: 1050 kg/m^3}"});
   return {.youngs_modulus = found->youngs_modulus, .density = found->density, .poissons_ratio = found->poissons_ratio, .damping_ratio = found->damping_ratio, .friction = found->friction};

@@ -272,7 +272,8 @@ void mutate(Value& value, const Vocabulary& vocabulary, Random& random) {
 }
 
 std::string mutate_text(std::string text, Random& random) {
-  static constexpr std::string_view kLetters("{}[]:,-'\"#&*!|>%@`~? \t\n\r\0\xff\xc3\xa9 0123456789e.ax", 48);
+  static constexpr char kAll[] = "{}[]:,-'\"#&*!|>%@`~? \t\n\r\0\xff\xc3\xa9 0123456789e.ax";
+  constexpr std::string_view kLetters(kAll, sizeof kAll - 1);
   for (std::size_t left = 1 + random.below(8); left > 0 && !text.empty(); --left) {
     const std::size_t at = random.below(text.size());
     switch (random.below(6)) {

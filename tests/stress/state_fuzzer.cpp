@@ -46,7 +46,9 @@ class StateFuzzer {
   }
 
   [[nodiscard]] Trial trial(std::uint64_t number) const {
-    const auto [saved, bytes] = make(number);
+    const std::pair<const Saved*, std::string> made = make(number);
+    const Saved* const saved = made.first;  // clang 14 has no lambdas that use parts of a structured binding
+    const std::string& bytes = made.second;
     const fs::path path = settings_.scratch / "fuzz.state";
     write_text(path, bytes);
     std::string fault;
@@ -54,7 +56,7 @@ class StateFuzzer {
       try {
         const scenes::State state = scenes::load_state(path, saved->origin);
         // The end of another state may be all of it.
-        const bool known = std::any_of(saved_.begin(), saved_.end(), [&bytes = bytes, &state](const Saved& s) {
+        const bool known = std::any_of(saved_.begin(), saved_.end(), [&bytes, &state](const Saved& s) {
           return s.bytes == bytes && s.hash == state.hash() && s.frame == state.frame;
         });
         if (!known) fault = "a state that is not what was saved was read without a word";

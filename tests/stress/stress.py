@@ -130,9 +130,9 @@ FOOT = """
 - **Power failure and network file systems.** A kill ends the process, not the machine. Files are flushed to the disk before they get their final names,
   but nobody has pulled a plug. NFS has not been tried; on sshfs, mounted once, 13 kills, 4 races, 8 kills while frames are shared and 6 signals show no fault.
 - **OpenVDB files.** No command reads them. A damaged file is exported again from the saved states.
-- **Fuzzing led by coverage.** It needs clang. `scripts/test.sh` runs the targets of meshes, tables and pictures for a minute each, with the address and
-  undefined-behaviour sanitizers, and replays the corpora of all with changes. `scripts/check_all.sh sanitizers` runs each target for a minute, and
-  `scripts/stress.sh libfuzzer` for an hour.
+- **Fuzzing led by coverage.** It needs clang. `scripts/test.sh` runs each target for a minute, with the address and undefined-behaviour sanitizers in core, render
+  and scenes, and replays the corpora with changes in the optimised build. `scripts/check_all.sh sanitizers` runs each target for a minute with the sanitizers in
+  all modules, and `scripts/stress.sh libfuzzer` for an hour.
 - **Sanitizers.** `scripts/test.sh` runs core, implicit and collision with those of GCC, without the longest tests (CMakePresets.json). `scripts/check_all.sh sanitizers` builds all modules and the tool with those of clang.
   [checks.md](checks.md) names the version for which it passed; without a line there it has not been run.
 - **Bits of other builds.** Results are the same for any number of threads, but not for another compiler. A run continues only from states of its own build.

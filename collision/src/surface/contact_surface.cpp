@@ -4,6 +4,7 @@
 #include <array>
 
 #include "supple/core/error.h"
+#include "surface/kept_results.h"
 #include "surface/pair_solver.h"
 
 namespace supple::collision {
@@ -85,7 +86,7 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   boxes.resize(bodies.size());
   partners.build(bodies.size(), candidates.pair);
   // In portions, so that what pairs leave behind is joined while it is still near, and buffers stay small.
-  constexpr std::size_t kPortion = 512, kBlock = 4;
+  constexpr std::size_t kPortion = 512, kBlock = 4, kMostKept = std::size_t{32} << 20;
   const std::size_t pairs = candidates.pair.size();
   if (results.size() < std::min(pairs, kPortion)) results.resize(std::min(pairs, kPortion));
   begins.resize(kPortion / kBlock);
@@ -132,6 +133,7 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
         at += extent;
       }
     });
+    keep_room(results, kMostKept);
   }
   resize(out, size, false);
 }

@@ -318,6 +318,7 @@ std::vector<std::pair<Expansion::Index, std::size_t>> Expansion::counts_of(const
       counts.push_back({{name, 0.0}, static_cast<std::size_t>(value.number)});
     } catch (const ExpressionFault& fault) {
       fail(mark, key, fault);
+      counts.push_back({{name, 0.0}, 1});  // what uses the index has no fault of its own
     }
   };
   if (repeat.kind == Node::Kind::Mapping) {

@@ -13,6 +13,7 @@
 #include "file/scale_object.h"
 #include "file/scene_keys.h"
 #include "file/scene_places.h"
+#include "file/short_keys.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/accuracy.h"
 
@@ -140,6 +141,8 @@ Node* expand(Node* root, std::span<const Setting> settings, Tree& tree, FaultLis
     Override(tree, faults, setting.source, setting.path).apply(root, setting.value);
   }
   const std::size_t before = faults.count();
+  tell_misspelt_short_keys(*root, faults);
+  if (faults.count() > before) faults.raise();
   Expansion expansion(*root, tree, faults);
   root = expansion.expand_scene(*root);
   std::vector<Node*> values;
