@@ -13,7 +13,7 @@ namespace supple::scenes {
 [[nodiscard]] int preview_stride(const Scene& scene);
 
 /// Overrides as of `--set` with which the scene is read again as its preview: pictures of a quarter of the size with one sample a pixel by OpenGL,
-/// lattice cells twice as long, contact.error at least 3e-2, accuracy 1e-2 where the scene gives another one and leaves its steps open; every `preview_stride`-th frame; no other
+/// lattice cells twice as long, contact.error at least 3e-2, accuracy 4e-2 where the scene leaves its steps open; every `preview_stride`-th frame; no other
 /// files. Times and cameras stay.
 /// @throws as `build_model`, which gives the lattice cells
 [[nodiscard]] std::vector<std::string> preview_overrides(const Scene& scene);

@@ -12,6 +12,7 @@ namespace {
 constexpr int kSmaller = 4;             // edges of pictures
 constexpr int kLeastEdge = 16;          // [pixel]
 constexpr double kCoarserCell = 2.0;
+constexpr double kAccuracy = 4e-2;      // steps twice as long as by default
 constexpr double kContactError = 3e-2;  // of force and area
 constexpr double kLeastRate = 12.0;     // frames per second that still show motion
 constexpr int kMostSubsteps = 1 << 20;  // that the keys take
@@ -58,7 +59,7 @@ std::vector<std::string> preview_overrides(const Scene& scene) {
   if (!scene.output.film) out.emplace_back("output.film=true");
   out.emplace_back("render={renderer: gl}");  // without the keys of the path tracer
   out.push_back("contact.error=" + number_text(std::max(contact_error(scene), kContactError)));
-  if (scene.accuracy && leaves_steps_open(scene)) out.push_back("accuracy=" + number_text(kDefaultAccuracy));
+  if (leaves_steps_open(scene)) out.push_back("accuracy=" + number_text(kAccuracy));
   add_frame_rate(scene, out);
   add_meshing(scene, out);
   return out;
