@@ -69,7 +69,7 @@ uniform int has_glass;            // 0: none
 vec3 passed_by_glass(vec3 p, vec3 n) {
   vec2 texel = shadow_extent.xy / max(shadow_texels, 1.0);
   float step = max(texel.x, texel.y);
-  vec3 q = (shadow_to_unit * vec4(p + n * (1.2 * step), 1.0)).xyz;
+  vec3 q = (shadow_to_unit * vec4(p + (1.2 * step) * n, 1.0)).xyz;
   bool seen = has_glass > 0 && all(greaterThan(q.xy, vec2(0.0))) && all(lessThan(q.xy, vec2(1.0)));
   float slack = 2.0 * step / shadow_extent.z;
   float reach = max(light_tangent * clamp(q.z, 0.0, 1.2) * shadow_extent.z, 1.5 * step);
