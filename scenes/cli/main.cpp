@@ -188,14 +188,20 @@ tool::ProgressBar make_bar(const Arguments& arguments) {
   return tool::ProgressBar(arguments.quiet ? tool::ProgressStyle::None : tool::progress_style(arguments.progress));
 }
 
-scenes::Scene read_for_run(const Arguments& arguments) {
+/// A scene, or its preview, whose frames are every so manyth of the scene's.
+struct SceneToRun {
+  scenes::Scene scene;
+  int stride = 1;
+};
+
+SceneToRun read_for_run(const Arguments& arguments) {
   try {
     scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
     if (!arguments.fingerprint.empty()) scenes::expect_fingerprint(scene, arguments.fingerprint);
-    if (!arguments.preview) return scene;
+    if (!arguments.preview) return {.scene = std::move(scene)};
     std::vector<std::string> set = scenes::preview_overrides(scene);
     set.insert(set.begin(), arguments.set.begin(), arguments.set.end());
-    return scenes::read_scene(arguments.scene, set, arguments.allowed);
+    return {.scene = scenes::read_scene(arguments.scene, set, arguments.allowed), .stride = scenes::preview_stride(scene)};
   } catch (const Error& error) {
     if (arguments.dry_run) throw;  // it leaves no files
     const std::string name = fs::path(arguments.scene).stem().string();
@@ -204,14 +210,27 @@ scenes::Scene read_for_run(const Arguments& arguments) {
   }
 }
 
+/// `--frames` are those of the whole scene.
+std::set<int> frames_of_preview(const std::set<int>& frames, int stride) {
+  std::set<int> shown;
+  for (const int frame : frames) shown.insert(frame >= 1 ? 1 + (frame - 1) / stride : frame);
+  return shown;
+}
+
 int run(const Arguments& arguments) {
-  const scenes::Scene scene = read_for_run(arguments);
+  const auto [scene, stride] = read_for_run(arguments);
   tool::ProgressBar bar = make_bar(arguments);
   if (arguments.dry_run) {
-    std::cout << scenes::text_of(scenes::estimate_run(scene, run_options(arguments, {}, bar)));
+    scenes::RunOptions options = run_options(arguments, {}, bar);
+    options.frames = frames_of_preview(options.frames, stride);
+    std::cout << scenes::text_of(scenes::estimate_run(scene, options));
     return 0;
   }
   scenes::RunOptions options = run_options(arguments, folder_of(scene, arguments), bar);
+  options.frames = frames_of_preview(options.frames, stride);
+  if (arguments.preview && !arguments.quiet) {
+    print(std::cout, "preview: a quarter of the size, %s, coarse meshes and contact\n", stride == 1 ? "all frames" : ("one frame of " + std::to_string(stride)).c_str());
+  }
   if (options.from && options.from->folder.empty()) options.from->folder = fs::path("out") / scenes::scene_name(scene);
   std::optional<tool::ViewServer> server;
   if (arguments.view) {
@@ -422,8 +441,8 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_verb->add_flag("--render-only", a.render_only, "draw pictures and film from the saved states of an earlier run, as `supple render` does");
   run_verb->add_flag("--dry-run", a.dry_run, "print particles, steps, triangles, memory, disk and time that the run would take, from a sample of its frames; writes nothing")
       ->excludes("--render-only")->excludes("--resume")->excludes("--overwrite");
-  run_verb->add_flag("--preview", a.preview, "a quick film: pictures of a quarter of the size, coarse meshes and contact; the folder is out/NAME_preview")
-      ->excludes("--render-only");
+  run_verb->add_flag("--preview", a.preview, "a quick film: pictures of a quarter of the size, 12 frames per second or a little more, coarse meshes and contact; the folder is out/NAME_preview")
+      ->excludes("--render-only")->excludes(from_frame);
   run_verb->footer(std::string(kFilmRule) +
                    "With --frames a run ends after the last of them; result.json holds its last frame, and --resume continues from there.\n\n"
                    "Example: supple run scenes/library/figures/ball_hits_spiral.yaml --out out/spiral");

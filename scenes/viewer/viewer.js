@@ -257,10 +257,12 @@
     points.geometry.setAttribute("color", new T.BufferAttribute(colours, 3));
   }
 
+  /** The largest arrow is as long as a share of what the scene's camera sees, or of the whole scene where that is smaller. */
   function addArrow(at, force, sign) {
-    const size = Math.hypot(...force), length = 0.3 * limits.size * byId("length").value * size / limits.force;
-    if (!(length > 1e-4 * limits.size)) return;
-    const arrow = new T.Group(), width = 0.0028 * limits.size, cone = Math.min(0.4 * length, 8 * width);
+    const [from, to, angle] = frames[shown].camera, seen = 2 * Math.tan(0.5 * angle) * Math.hypot(...from.map((x, k) => x - to[k]));
+    const unit = Math.min(limits.size, seen), size = Math.hypot(...force), length = 0.3 * unit * byId("length").value * size / limits.force;
+    if (!(length > 1e-4 * unit)) return;
+    const arrow = new T.Group(), width = 0.0028 * unit, cone = Math.min(0.4 * length, 8 * width);
     const body = new T.Mesh(shaft, arrowMaterial), end = new T.Mesh(tip, arrowMaterial);
     body.scale.set(width, length - cone, width);
     end.scale.set(2.6 * width, cone, 2.6 * width);

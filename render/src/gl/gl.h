@@ -17,7 +17,7 @@ namespace supple::render {
 #define SUPPLE_GL_FUNCTIONS(X)                                                                                \
   X(ACTIVETEXTURE, ActiveTexture) X(ATTACHSHADER, AttachShader) X(BINDBUFFER, BindBuffer)                     \
   X(BINDFRAMEBUFFER, BindFramebuffer) X(BINDSAMPLER, BindSampler) X(BINDTEXTURE, BindTexture)                 \
-  X(BINDVERTEXARRAY, BindVertexArray) X(BUFFERDATA, BufferData)               \
+  X(BINDVERTEXARRAY, BindVertexArray) X(BLENDFUNC, BlendFunc) X(BUFFERDATA, BufferData)               \
   X(CHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus) X(CLEAR, Clear)         \
   X(CLEARCOLOR, ClearColor) X(CLEARDEPTH, ClearDepth) X(CLIPCONTROL, ClipControl) X(COMPILESHADER, CompileShader) X(CREATEPROGRAM, CreateProgram)                   \
   X(CREATESHADER, CreateShader) X(CULLFACE, CullFace) X(DELETEBUFFERS, DeleteBuffers)                         \

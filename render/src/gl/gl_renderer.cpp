@@ -15,6 +15,8 @@ namespace {
 constexpr double kOcclusionRadius = 0.07;
 constexpr double kRegion = 3.0;
 
+bool is_glass(const Item& item) { return item.inside.kind == InsideKind::Glass; }
+
 }  // namespace
 
 void GlRenderer::draw_range(const DrawRange& range) const {
@@ -22,9 +24,12 @@ void GlRenderer::draw_range(const DrawRange& range) const {
                    reinterpret_cast<const void*>(range.first * sizeof(std::uint32_t)));
 }
 
-void GlRenderer::draw_all_items() const {
+/// Those of glass, or all others.
+void GlRenderer::draw_items(std::span<const Item> items, bool glass) const {
   gl_.BindVertexArray(item_array_);
-  draw_range({.first = 0, .count = list_.indices.size(), .item = 0});
+  for (const DrawRange& range : list_.ranges) {
+    if (is_glass(items[range.item]) == glass) draw_range(range);
+  }
 }
 
 void GlRenderer::draw_cover() const {
@@ -41,12 +46,12 @@ void GlRenderer::begin(const Target& target, bool depth) const {
     gl_.Disable(GL_DEPTH_TEST);
 }
 
-void GlRenderer::draw_shadow_map(const MapFit& fit) const {
+void GlRenderer::draw_shadow_map(const MapFit& fit, std::span<const Item> items) const {
   begin(shadow_, true);
   gl_.Clear(GL_DEPTH_BUFFER_BIT);
   programs_->depth.use();
   programs_->depth.set("to_clip", fit.to_clip);
-  draw_all_items();
+  draw_items(items, false);
 }
 
 void GlRenderer::draw_ground_occlusion(const MapFit& fit, float ground_height) {
@@ -90,7 +95,7 @@ void GlRenderer::draw_geometry(const CameraMatrices& camera, std::span<const Ite
   gl_.BindVertexArray(item_array_);
   for (const DrawRange& range : list_.ranges) {
     set_cover(items[range.item], range.item);
-    programs_->geometry.set("id", static_cast<int>(range.item + 1));
+    programs_->geometry.set("id", geometry_id(items[range.item], range.item));
     draw_range(range);
   }
   end_geometry();
@@ -144,6 +149,9 @@ void GlRenderer::set_light(const Program& program, const Shot& shot, const View&
   program.set("shadow_depth", kShadowDepth);
   program.set("shadow_compare", kShadowCompare);
   program.set("shadow_texels", shot.shadow ? static_cast<float>(settings_.shadow_size) : 0.0F);
+  program.set("glass_depth", kGlassDepth);
+  program.set("glass_passed", kGlassPassed);
+  program.set("has_glass", shot.glass ? 1 : 0);
   if (shot.shadow) {
     program.set("shadow_to_unit", shot.shadow->to_unit);
     program.set("shadow_axes", shot.shadow->axes);
@@ -274,7 +282,7 @@ Image GlRenderer::read_back() {
 }
 
 /// Depths that area lights see, two by two in one texture.
-std::vector<AreaMap> GlRenderer::draw_area_maps(const View& view) {
+std::vector<AreaMap> GlRenderer::draw_area_maps(const View& view, std::span<const Item> items) {
   std::vector<AreaMap> maps;
   if (!area_maps_) {
     gl_.ActiveTexture(GL_TEXTURE0 + kAreaDepth);
@@ -291,7 +299,7 @@ std::vector<AreaMap> GlRenderer::draw_area_maps(const View& view) {
     if (maps.back().extent.z() == 0.0F) continue;
     gl_.Viewport(static_cast<int>(i & 1) * kAreaMapSize, static_cast<int>(i >> 1) * kAreaMapSize, kAreaMapSize, kAreaMapSize);
     programs_->depth.set("to_clip", maps.back().to_clip);
-    draw_all_items();
+    draw_items(items, false);
   }
   return maps;
 }
@@ -330,9 +338,11 @@ GlRenderer::Shot GlRenderer::draw(const LocalView& local, std::span<const Item> 
   if (std::any_of(items.begin(), items.end(), [](const Item& item) { return item.two_sided; })) gl_.Disable(GL_CULL_FACE);
   if (has_region && settings_.shadow_size > 0 && view.light.intensity > 0.0) {
     shot.shadow = fit_map(region, view.light.direction, settings_.shadow_size);
-    draw_shadow_map(*shot.shadow);
+    draw_shadow_map(*shot.shadow, items);
+    shot.glass = std::any_of(items.begin(), items.end(), is_glass);
+    if (shot.glass) draw_glass_maps(*shot.shadow, view.light, items);
   }
-  if (!view.area_lights.empty()) shot.area = draw_area_maps(view);
+  if (!view.area_lights.empty()) shot.area = draw_area_maps(view, items);
   if (has_region && view.ground) {
     const double ground = view.ground->height;
     const double above = region.upper.z() - ground;

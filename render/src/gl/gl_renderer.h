@@ -20,12 +20,14 @@ namespace supple::render {
 // Texture units: one for each map, for the lifetime of the context.
 enum Unit : int {
   kShadowDepth, kShadowCompare, kHeights, kGroundOcclusion, kGeometry, kDepths, kOcclusion, kBlurred, kMaterials,
-  kPaints, kPicture, kColourMaps, kAreaDepth, kAreaCompare, kGroundPicture, kUploads
+  kPaints, kPicture, kColourMaps, kAreaDepth, kAreaCompare, kGroundPicture, kGlassDepth, kGlassPassed, kUploads
 };
 inline constexpr int kHeightMapSize = 256;
 inline constexpr int kGroundOcclusionSize = 96, kSmallGroundOcclusionSize = 48;  // with shadow maps of small pictures
 // Materials lie in double rows of this many items; the shader uses the constants 4095 and 12.
 inline constexpr std::size_t kMaterialRow = 4096;
+// Of the ids of the geometry buffer; the shaders use the constant 0x40000000.
+inline constexpr int kFixedId = 1 << 30;
 inline constexpr std::size_t kAreaLights = 4;
 inline constexpr int kAreaMapSize = 1024;  // of each of the four, two by two
 
@@ -47,11 +49,19 @@ class GlRenderer final : public Renderer {
     GLuint buffer = 0;
     GLuint maps = 0;
   };
+  /// Program and maps for what glass lets through from the sun, made with the first glass.
+  struct Glass {
+    Glass(const Gl& gl, int map_size);
+    Program passed;
+    Target nearest;  // depth of the first glass along the light
+    Target light;    // share of the light that comes through all of it
+  };
   struct LightPrograms;
   /// Data for drawing the lit picture again.
   struct Shot {
     CameraMatrices camera;
     std::optional<MapFit> shadow;
+    bool glass = false;  // stands in the shadow map
     std::optional<MapFit> heights;
     std::vector<AreaMap> area;  // of each area light
     float radius = 0.0F;        // of ambient occlusion
@@ -69,15 +79,16 @@ class GlRenderer final : public Renderer {
   [[nodiscard]] shaders::Lighting lighting(const View& view, std::span<const Item> items, bool scene_linear) const;
   [[nodiscard]] const LightPrograms& light_programs(const shaders::Lighting& lighting);
   void draw_range(const DrawRange& range) const;
-  void draw_all_items() const;
+  void draw_items(std::span<const Item> items, bool glass) const;
   void draw_cover() const;
   void begin(const Target& target, bool depth) const;
   void begin_geometry(const Target& target) const;
   void end_geometry() const;
 
   [[nodiscard]] Shot draw(const LocalView& local, std::span<const Item> items);
-  [[nodiscard]] std::vector<AreaMap> draw_area_maps(const View& view);
-  void draw_shadow_map(const MapFit& fit) const;
+  [[nodiscard]] std::vector<AreaMap> draw_area_maps(const View& view, std::span<const Item> items);
+  void draw_shadow_map(const MapFit& fit, std::span<const Item> items) const;
+  void draw_glass_maps(const MapFit& fit, const Light& light, std::span<const Item> items);
   void draw_ground_occlusion(const MapFit& fit, float ground_height);
   void draw_geometry(const CameraMatrices& camera, std::span<const Item> items) const;
   void draw_painted_geometry(const CameraMatrices& camera, std::span<const Item> items) const;
@@ -104,6 +115,7 @@ class GlRenderer final : public Renderer {
   std::string description_;
   std::unique_ptr<Programs> programs_;
   std::unique_ptr<Painting> painting_;
+  std::unique_ptr<Glass> glass_;
   std::map<shaders::Lighting, std::unique_ptr<LightPrograms>> light_programs_;
   std::map<std::shared_ptr<const Image>, GLuint> pictures_;  // those that the last picture showed
   bool painted_ = false;  // the items of this picture
@@ -149,6 +161,9 @@ struct GlRenderer::LightPrograms {
   Program ground;
   Program items;
 };
+
+/// Of an item in the geometry buffer.
+[[nodiscard]] inline int geometry_id(const Item& item, std::size_t index) { return static_cast<int>(index + 1) | (item.fixed ? kFixedId : 0); }
 
 [[nodiscard]] std::unique_ptr<Renderer> make_gl_renderer(const RenderSettings& settings);
 

@@ -147,7 +147,7 @@ void GlRenderer::draw_painted_geometry(const CameraMatrices& camera, std::span<c
   gl_.BindVertexArray(item_array_);
   for (const DrawRange& range : list_.ranges) {
     const Item& item = items[range.item];
-    program.set("id", static_cast<int>(range.item + 1));
+    program.set("id", geometry_id(item, range.item));
     set_cover(item, range.item);
     if (item.surface) {
       set_paint(program, item);

@@ -13,6 +13,11 @@ GlRenderer::Programs::Programs(const Gl& gl, int samples)
       occlusion(gl, shaders::whole_picture(), shaders::screen_occlusion(samples)),
       blur(gl, shaders::whole_picture(), shaders::occlusion_blur()) {}
 
+GlRenderer::Glass::Glass(const Gl& gl, int map_size)
+    : passed(gl, shaders::surface(), shaders::passed_by_glass()),
+      nearest(make_target(gl, map_size, map_size, {.colour = 0, .depth = true})),
+      light(make_target(gl, map_size, map_size, {.colour = GL_RGBA8})) {}
+
 GlRenderer::LightPrograms::LightPrograms(const Gl& gl, const shaders::Lighting& lighting)
     : classify(gl, shaders::whole_picture(), shaders::classify(lighting)),
       ground(gl, shaders::whole_picture(), shaders::lit_ground(lighting)),
@@ -182,6 +187,40 @@ Eigen::Vector3f shown_colour(const Item& item) {
 }
 
 }  // namespace
+
+void GlRenderer::draw_glass_maps(const MapFit& fit, const Light& light, std::span<const Item> items) {
+  if (!glass_) {
+    gl_.ActiveTexture(GL_TEXTURE0 + kUploads);
+    glass_ = std::make_unique<Glass>(gl_, shadow_.width);
+    bind(kGlassDepth, glass_->nearest.depth, GL_TEXTURE_2D);
+    bind(kGlassPassed, glass_->light.colour, GL_TEXTURE_2D);
+  }
+  begin(glass_->nearest, true);
+  gl_.Clear(GL_DEPTH_BUFFER_BIT);
+  programs_->depth.use();
+  programs_->depth.set("to_clip", fit.to_clip);
+  draw_items(items, true);
+
+  begin(glass_->light, false);
+  gl_.ClearColor(1.0F, 1.0F, 1.0F, 1.0F);
+  gl_.Clear(GL_COLOR_BUFFER_BIT);
+  gl_.Disable(GL_CULL_FACE);
+  gl_.Enable(GL_BLEND);
+  gl_.BlendFunc(GL_DST_COLOR, GL_ZERO);  // faces multiply
+  glass_->passed.use();
+  glass_->passed.set("to_clip", fit.to_clip);
+  glass_->passed.set("to_light", Eigen::Vector3f(-light.direction.normalized().cast<float>()));
+  gl_.BindVertexArray(item_array_);
+  for (const DrawRange& range : list_.ranges) {
+    const Item& item = items[range.item];
+    if (item.inside.kind != InsideKind::Glass) continue;
+    const double share = (item.inside.index - 1.0) / (item.inside.index + 1.0);
+    glass_->passed.set("tint", shown_colour(item));
+    glass_->passed.set("reflectance", static_cast<float>(share * share));
+    draw_range(range);
+  }
+  gl_.Disable(GL_BLEND);
+}
 
 void GlRenderer::upload_materials(std::span<const Item> items) {
   const std::size_t columns = std::min(items.size(), kMaterialRow);

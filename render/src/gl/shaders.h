@@ -1,7 +1,7 @@
 /// @file shaders.h
 /// The shaders of the picture, GLSL 3.30. A geometry pass keeps normal, id and depth of every sample; one pass over the
 /// picture then lights each surface of a pixel once, so that its price does not grow with the number of triangles.
-/// Ids in the geometry buffer: 0 no item, 1 + item. Items whose colour is not one for all (`painted`) write it, too.
+/// Ids in the geometry buffer: 0 no item, 1 + item, and a bit for fixed items. Items whose colour is not one for all (`painted`) write it, too.
 #pragma once
 
 #include <compare>
@@ -29,6 +29,7 @@ struct Lighting {
 // Fragment stages; `samples` is that of the geometry buffer.
 [[nodiscard]] std::string nothing();                      ///< depth only
 [[nodiscard]] std::string ground_occlusion();             ///< share of the sky a ground point sees past the height map
+[[nodiscard]] std::string passed_by_glass();              ///< share of the sun that passes a face of glass
 [[nodiscard]] std::string geometry();                     ///< normal and id
 [[nodiscard]] std::string painted_geometry();             ///< and the square root of the albedo
 [[nodiscard]] std::string screen_occlusion(int samples);  ///< ambient occlusion of items at half size, with depth

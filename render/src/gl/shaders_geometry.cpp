@@ -108,6 +108,21 @@ void main() {
 
 std::string nothing() { return std::string(kVersion) + "void main() {}\n"; }
 
+// A ray of light through a ball of glass is as long in it as its face is turned to the light, and each of its two faces takes a half.
+std::string passed_by_glass() {
+  return std::string(kVersion) + R"(
+uniform vec3 to_light;
+uniform vec3 tint;           // what the glass lets through along its least extent
+uniform float reflectance;   // at normal incidence
+centroid in vec3 world_normal;
+out vec4 passed;
+void main() {
+  float cosine = abs(dot(normalize(world_normal), to_light));
+  float fresnel = reflectance + (1.0 - reflectance) * pow(1.0 - cosine, 5.0);   // Schlick 1994
+  passed = vec4(pow(max(tint, 0.001), vec3(0.5 * cosine)) * (1.0 - fresnel), 1.0);
+})";
+}
+
 std::string geometry() {
   return std::string(kVersion) + kPacking + R"(
 centroid in vec3 world_normal;

@@ -59,6 +59,44 @@ float sun_visibility(vec3 p, vec3 n, bool wanted) {
 }
 )";
 
+/// Glass throws no shadow as other bodies do: the sun comes through straight on, less what its faces reflect and the glass takes.
+const char* const kGlassShadow = R"(
+#ifdef INSIDE
+uniform sampler2D glass_depth;    // of the first glass along the light, in the shadow map
+uniform sampler2D glass_passed;   // share of the light behind all of it
+uniform int has_glass;            // 0: none
+
+vec3 passed_by_glass(vec3 p, vec3 n) {
+  vec2 texel = shadow_extent.xy / max(shadow_texels, 1.0);
+  float step = max(texel.x, texel.y);
+  vec3 q = (shadow_to_unit * vec4(p + (1.2 * step) * n, 1.0)).xyz;
+  bool seen = has_glass > 0 && all(greaterThan(q.xy, vec2(0.0))) && all(lessThan(q.xy, vec2(1.0)));
+  float slack = 2.0 * step / shadow_extent.z;
+  float reach = max(light_tangent * clamp(q.z, 0.0, 1.2) * shadow_extent.z, 1.5 * step);
+  float turn = pixel_turn();
+  vec2 turned = vec2(cos(turn), sin(turn));
+  float nearest = 1.0;
+  for (int i = 0; i < (seen ? 12 : 0); ++i) {
+    vec2 offset = turned * (reach * sqrt((float(i) + 0.5) / 12.0)) / shadow_extent.xy;
+    nearest = min(nearest, textureLod(glass_depth, q.xy + offset, 0.0).r);
+    turned = kGoldenTurn * turned;
+  }
+  bool shaded = nearest < min(q.z, 1.0) - slack;
+  float radius = clamp(light_tangent * max(q.z - nearest, 0.0) * shadow_extent.z, 1.2 * step, reach);
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < (shaded ? 24 : 0); ++i) {
+    vec2 at = q.xy + turned * (radius * sqrt((float(i) + 0.5) / 24.0)) / shadow_extent.xy;
+    bool behind = textureLod(glass_depth, at, 0.0).r < q.z - slack;
+    sum += behind ? textureLod(glass_passed, at, 0.0).rgb : vec3(1.0);
+    turned = kGoldenTurn * turned;
+  }
+  return shaded ? sum / 24.0 : vec3(1.0);
+}
+#else
+vec3 passed_by_glass(vec3 p, vec3 n) { return vec3(1.0); }
+#endif
+)";
+
 /// Light and the filmic curve, a fit of the ACES output transform (Narkowicz 2015).
 const char* const kLight = R"(
 uniform vec3 eye;
@@ -292,7 +330,7 @@ vec2 ground_place(vec2 pixel) {
   return (eye + (transpose(mat3(view)) * ray) * ground_depth(ray)).xy;
 }
 
-vec4 ground_light(vec3 p, vec3 behind, float visible) {
+vec4 ground_light(vec3 p, vec3 behind, vec3 visible) {
   vec2 at = (ground_to_unit * vec4(p, 1.0)).xy;
   float ao = mix(1.0, textureLod(ground_visibility, clamp(at, 0.0, 1.0), 0.0).r, ground_occluded);
 #ifdef GROUND_PAINT
@@ -337,7 +375,9 @@ float item_visibility(float depth) {
   return sum / weight_sum;
 }
 
-// A dark hair line where another item meets this one in the picture and in depth, unless their faces are flush.
+const uint kFixed = 0x40000000u;
+
+// A dark hair line where another item meets this one in the picture and in depth, unless their faces are flush or both are fixed.
 float contact_line(uint id, float depth, vec3 n) {
   ivec2 last = ivec2(picture_size) - 1;
   float near_by = 6.0 * depth * 2.0 * half_extent.y / picture_size.y;
@@ -349,7 +389,8 @@ float contact_line(uint id, float depth, vec3 n) {
     uint other = geometry_there.g;
     float bent = min(8.0 * (1.0 - dot(unpack_normal(geometry_there.r), n)), 1.0);
     float gap = abs(eye_depth(DEPTH(there, 0).r) - depth);
-    touching += other != id ? bent * max(1.0 - gap / near_by, 0.0) : 0.0;
+    bool apart = other != id && (other & id & kFixed) == 0u;
+    touching += apart ? bent * max(1.0 - gap / near_by, 0.0) : 0.0;
     turned = mat2(0.70710678, 0.70710678, -0.70710678, 0.70710678) * turned;
   }
   return 1.0 - 0.6 * min(touching * 0.5, 1.0);
@@ -380,8 +421,8 @@ vec3 through_glass(vec3 n, vec3 v, float index, vec3 tint) {
 }
 #endif
 
-vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_albedo) {
-  int number = int(id) - 1;
+vec4 item_light(vec3 p, vec3 n, float depth, uint id, vec3 visible, vec3 own_albedo) {
+  int number = int(id & ~kFixed) - 1;
   ivec2 row = ivec2(number & 4095, (number >> 12) * 2);
   vec4 material = texelFetch(materials, row, 0);
   vec4 more = texelFetch(materials, row + ivec2(0, 1), 0);
@@ -420,7 +461,7 @@ vec4 item_light(vec3 p, vec3 n, float depth, uint id, float visible, vec3 own_al
   if (soft > 0.0) {
     float cosine = dot(n, to_light);
     // Shadows bleed in, too, and the own shadow of the body is that of the wrapped cosine.
-    float lit = mix(visible, 1.0, cosine < 0.0 ? 0.7 : 0.25 * min(soft, 1.0));
+    vec3 lit = mix(visible, vec3(1.0), cosine < 0.0 ? 0.7 : 0.25 * min(soft, 1.0));
     radiance += sun * lit * inner * scattered(inner, soft, cosine, -dot(v, to_light)) * base_of(normal_reflectance, nv);
     albedo = inner;
   }
@@ -494,12 +535,13 @@ void main() {
 }
 
 std::string lit_ground(const Lighting& lighting) {
-  return std::string(kVersion) + choices(lighting) + kDisc + kGeometry + kPixel + kShadow + kLight + kMaterial + kShown + lights(lighting) +
+  return std::string(kVersion) + choices(lighting) + kDisc + kGeometry + kPixel + kShadow + kGlassShadow + kLight + kMaterial + kShown + lights(lighting) +
          kGroundLight + R"(
 void main() {
   vec3 ray = eye_ray(gl_FragCoord.xy);
   vec3 p = eye + (transpose(mat3(view)) * ray) * ground_depth(ray);
-  colour = stored(ground_light(p, background_colour(), sun_visibility(p, vec3(0.0, 0.0, 1.0), true)));
+  vec3 up = vec3(0.0, 0.0, 1.0);
+  colour = stored(ground_light(p, background_colour(), sun_visibility(p, up, true) * passed_by_glass(p, up)));
 })";
 }
 
@@ -508,7 +550,7 @@ void main() {
 std::string lit_items(const Lighting& lighting) {
   return header(lighting.samples) + choices(lighting) +
          (lighting.painted ? painted_access(lighting.samples) : std::string("#define ALBEDO(at, s) vec3(0.0)\n")) + kDisc + kGeometry +
-         kPixel + kShadow + kLight + kMaterial + kShown + lights(lighting) + kGroundLight + kItemLight + R"(
+         kPixel + kShadow + kGlassShadow + kLight + kMaterial + kShown + lights(lighting) + kGroundLight + kItemLight + R"(
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec3 ray = eye_ray(gl_FragCoord.xy);
@@ -566,7 +608,7 @@ void main() {
     bool is_item = surface_id > 0u;
     bool is_floor = !is_item && surface_depth < depth_range.y * 0.5 * kNowhere;
     vec3 p = eye + along * surface_depth;
-    float visible = sun_visibility(p, n, is_item || is_floor);
+    vec3 visible = sun_visibility(p, n, is_item || is_floor) * passed_by_glass(p, n);
     vec4 lit = background(behind);
     if (is_item) lit = item_light(p, n, surface_depth, surface_id, visible, own_albedo);
     if (is_floor) lit = ground_light(p, behind, visible);

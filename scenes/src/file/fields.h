@@ -244,7 +244,7 @@ void fields(Archive& archive, Scene& d) {
   archive("gravity_course", d.gravity_course, {}, "a factor of gravity as a function of time; absent: 1");
   archive("wind", d.wind, {}, "velocity of the medium: the drag of objects with 'medium' is -gamma m (v - wind); absent: at rest");
   archive("planar", d.planar, {}, "motion in a plane: particles keep their z, which must be the same for all, and rotate about z only");
-  archive("accuracy", d.accuracy, between(1e-5, 1e-2, kNumber),
+  archive("accuracy", d.accuracy, between(1e-5, 4e-2, kNumber),
           "error of positions relative to the size of the bodies, until a scene becomes chaotic: sets time step, integrator, contact error, mesh error and noise together, as `supple explain` prints; other keys override what it sets; absent: the motion is that of 1e-2 where the scene gives neither time_step.size, time_step.substeps nor integrator.method and every law has an energy; meshes and pictures have their own defaults");
   archive("time_step", d.time_step, {}, "size of the time steps. A run ends with exit code 5 and names the fastest object if nine tenths of its energy come neither from the initial state nor from loads or obstacles. Scenes whose energy does not balance by their own choice are exempt: laws with paper_literal, contact.split: contribution, objects with 'volume', and obstacles with keys in steps that the scene fixes");
   archive("integrator", d.integrator, {}, "method of time integration");

@@ -359,5 +359,49 @@ TEST(LightInside, TurnsThePictureInABallOfGlassByBothRenderers) {
   }
 }
 
+Mesh block_of(const Vec3& low, const Vec3& high) {
+  const auto corner = [&](int k) { return Vec3((k & 1) != 0 ? high.x() : low.x(), (k & 2) != 0 ? high.y() : low.y(), (k & 4) != 0 ? high.z() : low.z()); };
+  Mesh mesh;
+  for (const auto& f : {std::array{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
+    add_quadrangle(mesh, corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]));
+  }
+  return mesh;
+}
+
+TEST(LightInside, ShadowsOfGlassAreWhatItLetsThroughByBothRenderers) {
+  // Sun from above through a plate: two faces of index 1.5 and the colour over its thickness. Beside the plate the light is whole.
+  const Mesh plate = block_of(Vec3(-1, -1, 2), Vec3(1, 1, 2.1));
+  const std::array<double, 3> tint = {0.9, 0.5, 0.2};
+  View view;
+  view.camera = {.from = Vec3(0, -8, 1), .look_at = Vec3::Zero(), .up = Vec3::UnitZ(), .field_of_view = 0.02};
+  view.light = {.direction = Vec3(0, 0, -1), .intensity = 40.0};
+  view.ground = Ground{.height = 0.0, .colour = Vec3::Constant(srgb(0.4))};
+  Item item{.mesh = &plate, .colour = Vec3(srgb(tint[0]), srgb(tint[1]), srgb(tint[2])),
+            .inside = {.kind = InsideKind::Glass, .index = 1.5, .depth = 0.1}};
+  for (const RendererKind kind : renderers()) {
+    const std::array<double, 4> open = mean(light_of(settings_for(kind), view, {}));
+    const std::array<double, 4> shaded = mean(light_of(settings_for(kind), view, std::span(&item, 1)));
+    for (std::size_t k = 0; k < 3; ++k) {
+      // The sky, a fortieth of the sun, is partly hidden by the plate.
+      EXPECT_NEAR(shaded[k] / open[k], 0.96 * 0.96 * tint[k], 0.03) << static_cast<int>(kind) << ' ' << k;
+    }
+  }
+}
+
+TEST(Contact, HasALineWhereABodyTouchesAndNoneBetweenFixedItems) {
+  const Mesh wall = block_of(Vec3(-1, 0, 0), Vec3(1, 1, 1)), step = block_of(Vec3(-1, -1, 0), Vec3(1, 0, 0.3));
+  View view;
+  view.camera = {.from = Vec3(0, -4, 3), .look_at = Vec3(0, 0, 0.3), .up = Vec3::UnitZ(), .field_of_view = 0.2};
+  view.light = {.direction = Vec3(0, 1, -1), .intensity = 3.0};
+  const auto darkest = [&](bool fixed) {
+    const std::array items = {Item{.mesh = &wall, .fixed = true}, Item{.mesh = &step, .fixed = fixed}};
+    const LinearImage image = light_of(settings_for(RendererKind::Gl, 48), view, items);
+    float least = INFINITY;
+    for (std::size_t i = 1; i < image.rgba.size(); i += 4) least = std::min(least, image.rgba[i]);
+    return least;
+  };
+  EXPECT_LT(darkest(false), 0.7F * darkest(true));
+}
+
 }  // namespace
 }  // namespace supple::render::test

@@ -3,14 +3,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "../small_scenes.h"
 #include "supple/scenes/estimate.h"
 #include "supple/scenes/model.h"
 #include "supple/scenes/read_scene.h"
+#include "support/source_dir.h"
 #include "support/temp_folder.h"
 
 namespace supple::scenes {
@@ -28,7 +32,7 @@ TEST(Preview, IsSmallerAndCoarser) {
   EXPECT_TRUE(small.output.mesh.empty());
   EXPECT_TRUE(small.output.particles.empty());
   EXPECT_TRUE(small.output.film.has_value());
-  EXPECT_EQ(small.frame_count(), whole.frame_count());
+  EXPECT_EQ(small.frame_count(), whole.frame_count());  // 8 frames a second are few already
   EXPECT_EQ(small.contact.error, 3e-2);
   EXPECT_NEAR(build_model(small).cell, 2.0 * build_model(whole).cell, 1e-12);
 }
@@ -37,7 +41,46 @@ TEST(Preview, KeepsStepsThatTheSceneFixes) {
   const std::string text = kScene + "time_step: {substeps: 64}\n";
   EXPECT_FALSE(parse_scene(text, "drops.yaml", ".", preview_overrides(parse_scene(text, "drops.yaml", "."))).accuracy.has_value());
   const std::string fine = kScene + "accuracy: 1e-4\n";
-  EXPECT_EQ(parse_scene(fine, "drops.yaml", ".", preview_overrides(parse_scene(fine, "drops.yaml", "."))).accuracy, 1e-2);
+  EXPECT_EQ(parse_scene(fine, "drops.yaml", ".", preview_overrides(parse_scene(fine, "drops.yaml", "."))).accuracy, 4e-2);
+}
+
+TEST(Preview, ShowsFewerFramesOfAFilmWithMany) {
+  const auto previewed = [](std::vector<std::string> set) {
+    const Scene whole = parse_scene(kScene, "drops.yaml", ".", set);
+    const std::vector<std::string> smaller = preview_overrides(whole);
+    set.insert(set.end(), smaller.begin(), smaller.end());
+    return std::pair(preview_stride(whole), parse_scene(kScene, "drops.yaml", ".", set));
+  };
+  const auto [four, fast] = previewed({"frame_rate=48", "time_step.substeps=64"});
+  EXPECT_EQ(four, 4);
+  EXPECT_EQ(fast.frame_count(), 13);
+  EXPECT_EQ(fast.frame_rate, 12.0);
+  EXPECT_EQ(fast.time_step.substeps, 256);  // steps as long as before
+  EXPECT_EQ(fast.time_step.max_substeps, 4 * 4096);
+  const auto [two, enough] = previewed({"frame_rate=30"});
+  EXPECT_EQ(two, 2);
+  EXPECT_EQ(enough.frame_count(), 16);
+  EXPECT_EQ(previewed({"frame_rate=23.9"}).first, 1);
+}
+
+TEST(Preview, IsThereOfEverySceneOfTheLibrary) {
+  for (const auto& entry : fs::recursive_directory_iterator(source_dir() / "scenes/library")) {
+    if (entry.path().extension() != ".yaml") continue;
+    const Scene whole = read_scene(entry.path());
+    const Scene small = read_scene(entry.path(), preview_overrides(whole));
+    EXPECT_EQ(small.render.renderer, RendererName::Gl) << entry.path();
+    EXPECT_GE(small.frame_count(), std::min(whole.frame_count(), 13)) << entry.path();
+  }
+}
+
+TEST(DryRun, CountsTheOneFrameOfAStill) {
+  std::string text = small::kTwoDrops;
+  text.append("duration: 1 ms\noutput: {mesh: ply}\n");
+  const RunEstimate estimate = estimate_run(parse_scene(text, "drops.yaml", "."), {.folder = {}});
+  EXPECT_EQ(estimate.frames, 1);
+  EXPECT_EQ(estimate.particles, 2u);
+  EXPECT_GT(estimate.triangles, 100.0);
+  EXPECT_GT(estimate.disk, 1000.0);
 }
 
 TEST(DryRun, CountsWhatTheRunMakes) {

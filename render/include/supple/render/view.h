@@ -100,6 +100,7 @@ struct Item {
   double field_reach = 0.0;                  ///< largest distance of the surface from its triangle [m]
   Inside inside = {};
   bool wireframe = false;                    ///< edges of the triangles, dark on a surface, in the item's colour without
+  bool fixed = false;                        ///< a part of what does not give way: OpenGL draws no line of contact where two of them meet
 };
 
 struct View {

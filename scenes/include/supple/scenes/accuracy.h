@@ -56,7 +56,7 @@ struct StageErrors {
   ErrorEstimate mesh;      ///< the error to which meshes are made
 };
 
-/// @param accuracy  in [1e-5, 1e-2]
+/// @param accuracy  in [1e-5, 4e-2]
 [[nodiscard]] AccuracyRules accuracy_rules(double accuracy);
 
 /// Sets the keys of pictures that follow from an accuracy. @pre no keys have been read into the scene yet

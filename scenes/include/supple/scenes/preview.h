@@ -1,5 +1,5 @@
 /// @file supple/scenes/preview.h
-/// A scene in small: pictures of a quarter of the size, coarse meshes and coarse contact, for a first look at its film.
+/// A scene in small: pictures of a quarter of the size, fewer frames, coarse meshes and coarse contact, for a first look at its film.
 #pragma once
 
 #include <string>
@@ -9,9 +9,12 @@
 
 namespace supple::scenes {
 
+/// Of so many frames the preview shows one: a power of two, such that 12 frames per second or more stay, and 13 frames or more in all.
+[[nodiscard]] int preview_stride(const Scene& scene);
+
 /// Overrides as of `--set` with which the scene is read again as its preview: pictures of a quarter of the size with one sample a pixel by OpenGL,
-/// lattice cells twice as long, contact.error at least 3e-2, accuracy 1e-2 where the scene gives another one and leaves its steps open; no other files. Times,
-/// frames and cameras stay.
+/// lattice cells twice as long, contact.error at least 3e-2, accuracy 4e-2 where the scene leaves its steps open; every `preview_stride`-th frame; no other
+/// files. Times and cameras stay.
 /// @throws as `build_model`, which gives the lattice cells
 [[nodiscard]] std::vector<std::string> preview_overrides(const Scene& scene);
 

@@ -63,6 +63,7 @@ struct CoarseFrame {
 };
 
 struct Coarse {
+  std::size_t particles = 0;       ///< at the end
   std::vector<CoarseFrame> frame;  ///< of frames 2, 3 ...
   std::vector<State> before;       ///< states from which the frames of the sample begin
   std::vector<int> sampled;        ///< these frames
@@ -95,6 +96,7 @@ Coarse follow(const Scene& scene, const SimulationOptions& options, int last, do
     out.frame.push_back({process_cpu_seconds() - begin, static_cast<int>(simulation.state().steps - steps)});
     spent += out.frame.back().cpu_s;
   }
+  out.particles = simulation.state().particles.size();
   return out;
 }
 
@@ -102,17 +104,20 @@ Coarse follow(const Scene& scene, const SimulationOptions& options, int last, do
 struct Sample {
   double cpu_s = 0.0, coarse_s = 0.0, wall_s = 0.0, steps_s = 0.0;
   double first_drawing_s = 0.0, drawing_s = 0.0;  ///< of frame 1, with what is made once; of the others
-  double triangles = 0.0;
+  double first_triangles = 0.0, triangles = 0.0;  ///< likewise
   bool touched = false;
 };
 
-void count_triangles(Simulation& simulation, Sample& sample) {
-  for (const Mesh& mesh : simulation.meshes()) sample.triangles += static_cast<double>(mesh.triangle.size());
+double triangles_of(Simulation& simulation) {
+  double sum = 0.0;
+  for (const Mesh& mesh : simulation.meshes()) sum += static_cast<double>(mesh.triangle.size());
+  return sum;
 }
 
 Sample make_sample(const Scene& scene, const RunOptions& options, const SimulationOptions& simulation_options, const OutputRequest& outputs,
                    const Coarse& coarse) {
   Sample sample;
+  const double begin_of_all = process_cpu_seconds();
   Simulation simulation(scene, simulation_options);
   FrameWriter writer(scene, simulation.model(), options, outputs);
   Reporter report(options, scene.frame_count());
@@ -122,7 +127,10 @@ Sample make_sample(const Scene& scene, const RunOptions& options, const Simulati
     save_state(state_path(options.folder, scene_name(scene), simulation.frame()), simulation.state(), origin_of(scene));
     return process_cpu_seconds() - begin;
   };
-  sample.first_drawing_s = write();
+  const bool has_meshes = outputs.images || outputs.meshes;
+  const double made_once = process_cpu_seconds() - begin_of_all;
+  sample.first_drawing_s = made_once + write();
+  if (has_meshes) sample.first_triangles = triangles_of(simulation);
   for (std::size_t k = 0; k < coarse.sampled.size(); ++k) {
     simulation.restore(coarse.before[k]);
     const double begin = process_cpu_seconds();
@@ -132,10 +140,18 @@ Sample make_sample(const Scene& scene, const RunOptions& options, const Simulati
     sample.cpu_s += process_cpu_seconds() - begin;
     sample.coarse_s += coarse.frame[static_cast<std::size_t>(coarse.sampled[k] - 2)].cpu_s;
     sample.drawing_s += write();
-    if (outputs.images || outputs.meshes) count_triangles(simulation, sample);
+    if (has_meshes) sample.triangles += triangles_of(simulation);
   }
   sample.touched = simulation.profile()[static_cast<std::size_t>(Stage::React)].visited > 0;
   return sample;
+}
+
+/// Pixels of a contact sheet, as `write_contact_sheet` makes it, over those of a picture.
+double sheet_share(const Scene& scene, double drawn) {
+  constexpr double kMostOnASheet = 12.0, kWidthOnASheet = 320.0;  // [pixel]
+  const double width = scene.output.images ? scene.output.images->size.at(0) : ImagesDesc{}.size.at(0);
+  const double shrunk = std::min(1.0, kWidthOnASheet / width);
+  return std::min(drawn, kMostOnASheet) * shrunk * shrunk;
 }
 
 double largest_resident_bytes() {
@@ -144,10 +160,16 @@ double largest_resident_bytes() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
+/// Three digits: an estimate has no more.
+std::string rough_text(double value) {
+  const double unit = value > 0.0 ? std::pow(10.0, std::floor(std::log10(value)) - 2.0) : 1.0;
+  return short_text(std::round(value / unit) * unit);
+}
+
 std::string time_text(double seconds) {
-  if (seconds < 100.0) return short_text(seconds) + " s";
-  if (seconds < 6000.0) return short_text(seconds / 60.0) + " min";
-  return short_text(seconds / 3600.0) + " h";
+  if (seconds < 100.0) return rough_text(seconds) + " s";
+  if (seconds < 6000.0) return rough_text(seconds / 60.0) + " min";
+  return rough_text(seconds / 3600.0) + " h";
 }
 
 }  // namespace
@@ -169,7 +191,7 @@ RunEstimate estimate_run(const Scene& scene, const RunOptions& options, double f
   full.progress = {};
   const Sample sample = make_sample(scene, full, simulation_options, outputs, coarse);
 
-  RunEstimate out{.objects = scene.objects.size(), .particles = coarse.before.empty() ? 0 : coarse.before.front().particles.size()};
+  RunEstimate out{.objects = scene.objects.size(), .particles = coarse.particles};
   out.frames = last;
   out.followed = 1 + static_cast<int>(coarse.frame.size());
   out.calibrated = static_cast<int>(coarse.sampled.size());
@@ -187,10 +209,11 @@ RunEstimate estimate_run(const Scene& scene, const RunOptions& options, double f
   const double again = sample.touched ? kEstimateWithContact : kEstimateAlone;
   out.simulation_s = sample.coarse_s > 0.0 ? (1.0 + again) * coarse_s * sample.cpu_s / sample.coarse_s : 0.0;
   out.drawing_s = sample.first_drawing_s + (drawn - 1.0) * sample.drawing_s / samples;
-  out.triangles = sample.triangles / samples;
+  out.triangles = out.calibrated > 0 ? sample.triangles / samples : sample.first_triangles;
   out.memory = largest_resident_bytes();
-  const double share = drawn / (samples + 1.0);
-  out.disk = share * scratch.bytes() + (outputs.film ? kFilmOfPictures * share * scratch.bytes(".png") : 0.0);
+  const double pictures = scratch.bytes(".png"), share = drawn / (out.calibrated + 1.0);
+  const double sheets = outputs.images ? pictures / (out.calibrated + 1.0) * sheet_share(scene, drawn) : 0.0;
+  out.disk = share * scratch.bytes() + sheets + (outputs.film ? kFilmOfPictures * share * pictures : 0.0);
   const double threads = Executor(options.threads).threads();
   const double alone = sample.cpu_s > 0.0 ? out.simulation_s * std::min(1.0, sample.wall_s / sample.cpu_s) : 0.0;
   out.wall_s = std::max(alone, (out.simulation_s + out.drawing_s) / threads);
@@ -204,7 +227,7 @@ std::string text_of(const RunEstimate& e) {
   line("particles", std::to_string(e.particles));
   line("frames", std::to_string(e.frames));
   line("steps", std::to_string(e.steps));
-  line("triangles", short_text(e.triangles) + " per frame");
+  line("triangles", std::to_string(std::lround(e.triangles)) + " per frame");
   line("memory", bytes_text(e.memory) + " for one frame at a time");
   line("disk", bytes_text(e.disk));
   line("CPU time", time_text(e.simulation_s) + " for steps, " + time_text(e.drawing_s) + " for meshes, pictures and files");

@@ -290,7 +290,7 @@ void ScenePictures::add_objects(Simulation& simulation) {
     const ObstacleDesc& d = scene_.obstacles[i];
     if (!d.visible) continue;
     add({.mesh = &obstacles_[i], .colour = d.colour, .roughness = d.roughness, .two_sided = d.shape != ObstacleName::Box,
-         .paint = obstacle_paints_[i]}, d.name);
+         .paint = obstacle_paints_[i], .fixed = true}, d.name);
   }
 }
 
