@@ -113,7 +113,10 @@ class Signals(unittest.TestCase):
                     # A second of the clock, or on a busy machine of processor time.
                     self.assertLess(min(waited, used), 1.1)
                     self.assertEqual(alive(process.pid), [])
-                    self.assertEqual(list(SCRATCH.rglob("*.tmp")), [])
+                    left = list(SCRATCH.rglob("*.tmp"))
+                    for path in left:  # the next commands leave none of their own
+                        path.unlink()
+                    self.assertEqual(left, [])
 
     def test_while_a_large_scene_is_read(self):
         self.ends_soon("check", "large.yaml", "--time-limit", "1000", *MEMORY)

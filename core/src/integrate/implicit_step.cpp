@@ -86,6 +86,26 @@ class StepPotential {
     return largest / h_;
   }
 
+  /// Whether the forces that the last `differentiate` left over change the velocity of each particle, turns at a distance of `length`, by at most
+  /// `of_stick` of the speed below which friction on it fades out. Particles that touch nothing pass motion on to those that do.
+  [[nodiscard]] bool leaves_less_than(double of_stick, double length) const {
+    const std::vector<std::uint32_t>& touched = buffers_.contact.touched();
+    const std::vector<double>& stick = buffers_.contact.least_stick_speed();
+    if (touched.empty()) return true;
+    const double least = *std::min_element(stick.begin(), stick.end());
+    std::size_t t = 0;
+    for (std::size_t i = 0; i < set_.size(); ++i) {
+      while (t < touched.size() && touched[t] < i) ++t;
+      const bool touches = t < touched.size() && touched[t] == i;
+      const double most = of_stick * (touches ? stick[t] : least) / h_;
+      const auto row = static_cast<Eigen::Index>(6 * i);
+      const double push2 = (1.0 / set_.mass[i] * buffers_.gradient.segment<3>(row)).squaredNorm();
+      const double spin2 = (buffers_.pose.orientation[i].conjugate() * Vec3(buffers_.gradient.segment<3>(row + 3))).cwiseQuotient(set_.inertia[i]).squaredNorm();
+      if (!(std::max(push2, length * length * spin2) <= most * most)) return false;
+    }
+    return true;
+  }
+
   /// Solves H correction = -gradient. The exact Hessian is taken where it is positive definite.
   /// @param renew  false: with the Hessian of the last call
   void solve(const IntegratorSettings& settings, const ParticleState& pose, bool renew, StepReport& report) {
@@ -194,7 +214,8 @@ void minimise(const IntegratorSettings& settings, double value, StepPotential& p
   constexpr int kMostHalvings = 30;
   constexpr double kKept = 0.1;          // of the correction before
   constexpr int kMostLags = 8;           // times that friction follows the normal forces
-  constexpr double kOfStickSpeed = 0.01; // Newton leaves about the square of it, in friction too, which pushes what rests
+  constexpr double kOfStickSpeed = 5e-3; // of velocities at the end of a step, which tell what holds to a hundredth of the friction
+  constexpr double kLastSlips = 5e-4;    // of the stick speed, in a correction: Newton leaves about the square of it, in friction too, which pushes what rests
   constexpr double kLagged = 1e-3;       // of all normal forces: a smaller change does not update friction
   report.within_tolerance = false;
   int lags = 0;
@@ -224,10 +245,12 @@ void minimise(const IntegratorSettings& settings, double value, StepPotential& p
     before = report.last_correction;
 
     // The gain of a small correction may be less than the potential's rounding errors.
-    // Friction is so steep in the slip that forces, and with them velocities, may err where the pose does not.
-    const double slips = std::max(buffers.contact.predict_friction(buffers.correction), potential.over_stick_speed(settings.length));
+    const double slips = buffers.contact.predict_friction(buffers.correction);
     const bool small = report.last_correction <= settings.tolerance;
-    const bool sure = small && (buffers.contact.empty() || (iteration > 0 && slips <= kOfStickSpeed));  // directions of friction are not known before
+    const bool sure = small && slips <= kOfStickSpeed;
+    // Friction is so steep in the slip that forces, and with them velocities, may err where the pose does not. Its directions are not known before the second
+    // correction.
+    const bool last = small && (buffers.contact.empty() || (iteration > 0 && std::max(slips, potential.over_stick_speed(settings.length)) <= kLastSlips));
     const double slope = buffers.gradient.dot(buffers.correction);
     const double angle = largest_angle(buffers.correction);
     double share = angle > kLargestTurn ? kLargestTurn / angle : 1.0;
@@ -235,7 +258,7 @@ void minimise(const IntegratorSettings& settings, double value, StepPotential& p
     double next = value;
     for (int halving = 0; halving < kMostHalvings; ++halving) {
       move(buffers.pose, buffers.correction, share, buffers.trial);
-      if (!sure) next = potential.value(buffers.trial);
+      if (!last) next = potential.value(buffers.trial);
       found = sure || next <= value + kDescent * share * slope + kRoundOff * std::abs(value);
       if (found) break;
       share *= 0.5;
@@ -245,7 +268,7 @@ void minimise(const IntegratorSettings& settings, double value, StepPotential& p
     std::swap(buffers.pose, buffers.trial);
     value = next;
     begin_at_pose();
-    if (sure || (small && is_rounding(buffers.correction, buffers.pose))) {
+    if (last || (small && (potential.leaves_less_than(kOfStickSpeed, settings.length) || is_rounding(buffers.correction, buffers.pose)))) {
       report.within_tolerance = true;
       return;
     }

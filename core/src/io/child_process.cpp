@@ -126,6 +126,14 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
+  /// Asks its group to end, and waits for as long at most.
+  void ask(std::chrono::milliseconds notice) {
+    ::kill(-process_, SIGTERM);
+    const auto last = std::chrono::steady_clock::now() + notice;
+    int status = 0;
+    while (!ended(status) && std::chrono::steady_clock::now() < last) (void)::poll(nullptr, 0, kSlice_ms);
+  }
+
   /// Whether it has ended; `status` is then set.
   bool ended(int& status) {
     const pid_t found = retried([&] { return ::waitpid(process_, &status, WNOHANG); });
@@ -193,7 +201,8 @@ std::filesystem::path find_program(const std::string& name) {
   return {};
 }
 
-ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::string> words, const std::atomic<int>* interrupt) {
+ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::string> words, const std::atomic<int>* interrupt,
+                       std::chrono::milliseconds notice) {
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -213,6 +222,7 @@ ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::st
   pollfd wait{.fd = messages.read.get(), .events = POLLIN, .revents = 0};
   // A program that it started may hold the pipe for longer, or it may close its own end.
   for (bool ended = false; !ended;) {
+    if (notice.count() > 0 && interrupt != nullptr && interrupt->load() != 0) child.ask(notice);
     heed(interrupt);
     (void)::poll(&wait, 1, kSlice_ms);  // broken off by a signal it is made again
     ended = child.ended(end.status);

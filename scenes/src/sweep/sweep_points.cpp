@@ -1,6 +1,7 @@
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <exception>
 #include <map>
@@ -34,6 +35,7 @@ using nlohmann::ordered_json;
 
 constexpr const char* kRowFile = "row.json";
 constexpr std::size_t kLargestRow = std::size_t{1} << 26;  // [byte]
+constexpr std::chrono::milliseconds kPointNotice{600};      // for a point to end by itself when the sweep is interrupted
 constexpr const char* kUnfinished = "unfinished";
 constexpr const char* kCrashed = "crashed";
 
@@ -220,7 +222,7 @@ class PointRunner {
     words.insert(words.end(), {folder_.string(), "--point", std::to_string(point.number)});
     io::ProgramEnd end;
     try {
-      end = io::run_program(words.front(), words, options_.interrupt);
+      end = io::run_program(words.front(), words, options_.interrupt, kPointNotice);
     } catch (const std::system_error& error) {
       throw Error(ErrorKind::Io, Fault{.place = words.front(), .key = {}, .expected = "cannot be started: " + error.code().message(), .found = {}, .hint = {}});
     }

@@ -31,6 +31,23 @@ TEST(ContactCapacity, OfEqualLinearBallsIsTheClosedForm) {
   EXPECT_NEAR(contact_capacity(stage.bodies()[1], stage.bodies()[0], -Vec3::UnitZ()) / (kPi * E * R * R * R / 3.0), 1.0, 5e-3);
 }
 
+TEST(ContactCapacity, AboveWhatIsEnoughIsAnEnergyOnTheWay) {
+  const double R = 0.1, E = 1e6;
+  const LinearSphere a{Vec3(0, 0, 0), Linear{R, 1.0 / R}}, b{Vec3(0, 0, 0.17), Linear{R, 1.0 / R}};
+  const implicit::HalfSpace plane{Vec3(0, 0, 0.08), -Vec3::UnitZ(), 1e6};
+  Stage stage;
+  stage.add(a, {a.centre}, E);
+  stage.add(b, {b.centre}, E);
+  stage.add(plane, {Vec3::Zero()}, E).fixed = true;
+  for (const std::size_t other : {1u, 2u}) {
+    const auto capacity = [&](double enough) { return contact_capacity(stage.bodies()[0], stage.bodies()[other], Vec3::UnitZ(), 12, enough); };
+    const double all = contact_capacity(stage.bodies()[0], stage.bodies()[other], Vec3::UnitZ(), 12);
+    EXPECT_GT(capacity(0.1 * all), 0.1 * all);
+    EXPECT_LE(capacity(0.1 * all), all);
+    EXPECT_EQ(capacity(1.1 * all), all);
+  }
+}
+
 TEST(ContactCapacity, OfABallOnARigidPlaneIsAllOfItsPressure) {
   const double R = 0.5, E = 1e4;
   const LinearSphere ball{Vec3(0, 0, 0.45), Linear{R, 1.0 / R}};

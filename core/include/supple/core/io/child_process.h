@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -24,8 +25,10 @@ struct ProgramEnd {
 /// It is killed with all of its group, what it has started included, when this process ends, however that ends.
 /// @param words      its arguments, the first one its name
 /// @param interrupt  kills it and its group when set by another thread or a signal; null: never
+/// @param notice     from a SIGTERM until it is killed for `interrupt`
 /// @throws std::system_error when it cannot be started, Interrupted when it was killed for `interrupt`
 [[nodiscard]] ProgramEnd run_program(const std::filesystem::path& program, std::vector<std::string> words,
-                                     const std::atomic<int>* interrupt);
+                                     const std::atomic<int>* interrupt,
+                                     std::chrono::milliseconds notice = {});
 
 }  // namespace supple::io
