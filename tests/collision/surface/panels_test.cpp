@@ -193,10 +193,10 @@ struct ConvexSphere : LinearSphere {
 
 /// Of three balls whose middle planes are known: of the pair's disc of radius a the third body takes the segment x > x0.
 TEST(Imprints, ThatTakeLessThanTheErrorLeaveThePatchAsItIs) {
-  constexpr double h = 0.9, x0 = 0.425;
+  constexpr double h = 0.9, x0 = 0.4168;
   const double a2 = 1.0 - h * h, d = x0 + std::sqrt(x0 * x0 + h * h);  // on z = 0 the third ball presses harder where 2 x d > d^2 - h^2
   const double half = std::acos(x0 / std::sqrt(a2)), whole = std::numbers::pi * a2, segment = a2 * half - x0 * std::sqrt(a2 - x0 * x0);
-  ASSERT_GT(segment, 2e-3 * whole);
+  ASSERT_GT(segment, 5e-3 * whole);  // what is left of the error is less than that
   const ConvexSphere upper{{Vec3(0.0, 0.0, h), {}}}, lower{{Vec3(0.0, 0.0, -h), {}}}, third{{Vec3(d, 0.0, 0.0), {}}};
   Stage stage;
   for (const ConvexSphere* ball : {&upper, &lower, &third}) stage.add(*ball, {ball->centre});
