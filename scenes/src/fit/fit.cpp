@@ -108,8 +108,15 @@ std::vector<Blob> blobs_of(std::span<const Ball> balls) {
 struct Faults {
   std::vector<std::uint32_t> missed;  ///< samples of the data outside the fit
   std::vector<Vec3> inside, outside;  ///< points of the fitted surface inside and outside the data
-  double largest = 0.0;
-  bool topology = false;              ///< the fitted surface has as many pieces and handles as the data
+  double largest = 1.0;
+  long topology = std::numeric_limits<long>::max();  ///< pieces and handles that the fitted surface has too many or too few
+
+  /// @param enough  a distance that needs no mending
+  [[nodiscard]] bool better_than(const Faults& other, double enough) const {
+    const bool near = largest <= enough;
+    if (near != (other.largest <= enough)) return near;
+    return near ? topology < other.topology : largest < other.largest;
+  }
 };
 
 /// Vertices of all pieces of a mesh but the largest.
@@ -138,19 +145,19 @@ Faults find_faults(const Data& data, const implicit::Field& field, double cell, 
   if (mesh.triangle.empty()) {
     out.missed.resize(data.surface.position.size());
     std::iota(out.missed.begin(), out.missed.end(), 0U);
-    out.largest = 1.0;
     return out;
   }
   const SurfaceTree tree(mesh);
   const std::vector<double> of_data = distances(data.surface.position, tree, executor), of_fit = distances(mesh.position, data.tree, executor);
   std::vector<double> value(data.surface.position.size());
   implicit::FieldView(field).evaluate(data.surface.position, value);
+  out.largest = 0.0;
   for (std::uint32_t k = 0; k < of_data.size(); ++k) {
     out.largest = std::max(out.largest, of_data[k]);
     if (of_data[k] > most && value[k] < 0.0) out.missed.push_back(k);
   }
   const MeshReport report = inspect(mesh);
-  out.topology = report.components == data.pieces && genus_of(report) == data.genus;
+  out.topology = std::abs(static_cast<long>(report.components) - static_cast<long>(data.pieces)) + std::abs(genus_of(report) - data.genus);
   const std::vector<char> small = on_small_pieces(mesh);
   const double apart = 0.5 * most;
   std::vector<Vec3> kept;
@@ -232,7 +239,7 @@ struct Skeleton {
 
 Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executor& executor) {
   constexpr double kReach = 0.6, kFirst = 0.35;  // of the error: balls reach samples, and distances that call for more
-  constexpr double kLeastReach = 0.15, kEnough = 0.7, kFiner = 0.6;
+  constexpr double kLeastReach = 0.15, kEnough = 0.8, kFiner = 0.6;
   constexpr double kWeight = 4.0;  // of a point where the sign is wrong, over its distance from the data
   constexpr int kRounds = 8, kIterations = 8;
   Targets targets = targets_of(data);
@@ -243,28 +250,35 @@ Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executo
   if (balls.size() > options.primitives) balls.resize(options.primitives);
   Skeleton out{blobs_of(balls), std::min(0.5 * options.error, 1.0 / 128.0)};
   const SolveOptions solving{.iterations = kIterations, .smallest = 0.25 * options.error / kPointRadius, .largest = 1.5 * data.largest_ball / kPointRadius};
+  const double enough = kEnough * options.error;
   double reach = kReach * options.error, most = kFirst * options.error;
+  std::vector<Blob> blobs = out.blobs;
+  Faults least;
   for (int round = 0; round < kRounds; ++round) {
     heed_scope();
-    balance(out.blobs, targets, solving, executor);
-    solve(out.blobs, targets, solving, executor);
-    prune(out.blobs, targets);
+    balance(blobs, targets, solving, executor);
+    solve(blobs, targets, solving, executor);
+    prune(blobs, targets);
     implicit::Field field;
-    build_field(out.blobs, field);
+    build_field(blobs, field);
     const Faults faults = find_faults(data, field, out.cell, most, executor);
-    if ((faults.topology && faults.largest <= kEnough * options.error) || round + 1 == kRounds) break;
-    if (faults.largest <= kEnough * options.error) most *= kFiner;  // what is wrong in the topology is smaller
+    if (faults.better_than(least, enough)) {
+      out.blobs = blobs;
+      least = faults;
+    }
+    if ((least.topology == 0 && least.largest <= enough) || round + 1 == kRounds) break;
+    if (faults.largest <= enough) most *= kFiner;  // what is wrong in the topology is smaller
     const auto weight = [&](const Vec3& p) { return kWeight * std::max(data.tree.distance(p), most); };
     for (const Vec3& p : faults.inside) targets.inside.add(p, weight(p));
     for (const Vec3& p : faults.outside) targets.outside.add(p, weight(p));
     reach = std::max(0.7 * reach, kLeastReach * options.error);
-    divide(out.blobs, data, field, faults.outside, reach);
-    if (out.blobs.size() > options.primitives) out.blobs.resize(options.primitives);
+    divide(blobs, data, field, faults.outside, reach);
+    if (blobs.size() > options.primitives) blobs.resize(options.primitives);
     std::vector<Ball> more = cover_surface(data.surface, data.points, data.radius, faults.missed, reach);
     for (const Vec3& p : faults.inside) more.push_back({p, std::min(data.tree.distance(p), data.largest_ball)});
-    more.resize(std::min<std::size_t>(more.size(), options.primitives - std::min<std::size_t>(options.primitives, out.blobs.size())));
+    more.resize(std::min<std::size_t>(more.size(), options.primitives - std::min<std::size_t>(options.primitives, blobs.size())));
     const std::vector<Blob> added = blobs_of(more);
-    out.blobs.insert(out.blobs.end(), added.begin(), added.end());
+    blobs.insert(blobs.end(), added.begin(), added.end());
   }
   return out;
 }
