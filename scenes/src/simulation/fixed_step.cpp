@@ -17,6 +17,7 @@ namespace {
 constexpr double kWorthALook = 1.0;  // iso radius of the thinner body: shorter motions of a pair are not checked
 constexpr double kLookEvery = 0.5;   // of the same
 constexpr double kSurely = 1.25;     // energies whose ratio is less may be the same
+constexpr double kErrorOfEnergies = 1e-2;  // far below that
 
 using Summary = collision::ContactSurface::Summary;
 
@@ -201,6 +202,7 @@ std::optional<TooCoarse> find_missed_contact(const StageContext& context, const 
   const std::vector<FastPair> fast = fast_pairs(context, step, trial);
   if (fast.empty()) return std::nullopt;
   StageContext now = context;
+  now.contact_error = kErrorOfEnergies;
   const auto look = [&](double share) {
     now.time = step.end - (1.0 - share) * step.size;
     std::vector<implicit::SampleState> kept = samples;

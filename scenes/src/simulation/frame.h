@@ -134,6 +134,7 @@ struct StageContext {
   const std::vector<std::uint32_t>* awake = nullptr;  ///< bodies that move, ascending; null: all
   const collision::StickState* sticks = nullptr;
   const std::function<bool(const Box&)>* shown = nullptr;  ///< selects surfaces to mesh, by their bounding boxes; null: all
+  double contact_error = 0.0;                         ///< of contact, where it is more than that of the scene
   std::uint64_t most_kept = implicit::kMostKeptToError;  ///< limit of kept data of meshes to an error, for all meshers of bodies that touch no other [byte]
 };
 

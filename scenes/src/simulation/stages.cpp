@@ -268,6 +268,7 @@ void solve_contact_surface(const StageContext& context, bool energy, Frame& fram
   StageProfile& profile = profile_of(context, Stage::SolveContactSurface);
   StageTimer timer(profile, context.timing);
   collision::ContactSettings settings = context.model.contact;
+  settings.error = std::max(settings.error, context.contact_error);
   settings.energy = energy;
   collision::solve_contact_surface(frame.bodies, frame.candidates, settings, context.executor, frame.surface);
   std::vector<std::uint8_t> touches(frame.bodies.size(), 0);

@@ -327,6 +327,29 @@ TEST(Panels, OfABedOverAnEdgeAgreeWithMarching) {
   }
 }
 
+/// Two layers of blobs that a hard block takes in up to the middle of the upper one: normals of the blobs there point all ways, but Sigma is nearly the block's face.
+TEST(Panels, OfABodyPressedDeeplyIntoAHardBlockAgreeWithMarching) {
+  std::vector<Vec3> centres = Mirrored::bed();
+  for (const Vec3& x : Mirrored::bed()) centres.push_back(x + Vec3(0.0, 0.0, 0.06));
+  const Blobs body(centres, Mirrored::kSupport);
+  const implicit::SolidBox block(Pose{Vec3(0.1, 0.1, -0.11), Quat::Identity()}, Vec3(0.4, 0.4, 0.2), 0.01, 20.0);
+  Stage stage;
+  stage.add(body.field, body.centre, 1.0).skeleton = &body.skeleton;
+  stage.add(block, {}, 100.0).fixed = true;
+  const ContactSurface::Summary exact = stage.solve({.error = 1e-5, .energy = false, .only = ContactRule::March}).summary.at(0);
+  ASSERT_LE(exact.error_estimate, 2e-5);
+  const PlaneSums sums{exact.force.norm(), exact.area, exact.centre_of_pressure};
+  for (const double asked : {1e-1, 1e-2, 1e-3}) {
+    const ContactSurface::Summary s = stage.solve({.error = asked, .energy = false}).summary.at(0);
+    EXPECT_EQ(s.rule, ContactRule::Panels) << asked;
+    EXPECT_LE(s.error_estimate, asked);
+    EXPECT_LE(error_of(s, sums), s.error_estimate + exact.error_estimate) << asked;
+    EXPECT_LE(s.points, 2000u) << asked;
+    EXPECT_LE(s.largest_overlap, 0.15);  // the body's height
+    EXPECT_GE(s.largest_overlap, 0.05);
+  }
+}
+
 TEST(Panels, AreTheSameWhicheverBodyIsNamedFirst) {
   const Mirrored bed(Mirrored::bed());
   Stage stage, swapped;

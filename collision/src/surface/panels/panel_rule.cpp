@@ -61,6 +61,8 @@ class PanelSolver {
   static int order_of(double error) { return std::clamp(static_cast<int>(std::lround(2.0 - 0.5 * std::log10(error))), 3, 8); }
 
   bool find_frame();
+  bool frame_from(const PressureBatch& batch);
+  void move_to_sigma(PressureBatch& batch) const;
   bool set_star(double margin);
   void set_enough(double depth);
   void start();
@@ -83,6 +85,7 @@ class PanelSolver {
   void split(const Panel& panel, std::size_t axis, double place, bool walls);
   [[nodiscard]] bool try_to_cut(Panel& panel);
   [[nodiscard]] bool has_one_sheet();
+  [[nodiscard]] bool ends_first(int side);
   void hand_over(PatchPoints& points, PanelOutcome& out);
 
   const PanelJob& job_;
@@ -94,12 +97,42 @@ class PanelSolver {
   double energy_ = 1.0;  // that errors of fluxes are measured against [J]
 };
 
-/// The frame whose last axis is the mean normal where the bodies press, and whether Sigma seems to be a graph over it.
+/// Newton's method to p_A = p_B, a few steps: normals beside Sigma say little of it where one body is pressed in deeply.
+void PanelSolver::move_to_sigma(PressureBatch& batch) const {
+  constexpr int kSteps = 3;
+  for (int step = 0; step < kSteps; ++step) {
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const Vec3 slope = batch.slope_a[i] - batch.slope_b[i];
+      const double square = slope.squaredNorm();
+      if (!(square > 0.0)) continue;
+      Vec3 move = ((batch.b[i] - batch.a[i]) / square) * slope;
+      const double length = move.norm();
+      if (length > setting_.view.reach) move *= setting_.view.reach / length;
+      batch.point[i] += move;
+    }
+    job_.pressure.evaluate(batch);
+  }
+}
+
+/// A frame from the starts as they are, or, where Sigma is no graph by these, from where they are on Sigma.
 bool PanelSolver::find_frame() {
   PressureBatch& batch = r_.batch;
-  batch.resize(job_.starts.size());
-  std::copy(job_.starts.begin(), job_.starts.end(), batch.point.begin());
-  job_.pressure.evaluate(batch);
+  const auto place_starts = [&] {
+    batch.resize(job_.starts.size());
+    std::copy(job_.starts.begin(), job_.starts.end(), batch.point.begin());
+    job_.pressure.evaluate(batch);
+  };
+  place_starts();
+  if (!frame_from(batch)) return false;
+  if (graph_) return true;
+  move_to_sigma(batch);
+  if (frame_from(batch)) return true;
+  place_starts();
+  return frame_from(batch);
+}
+
+/// The frame whose last axis is the mean normal where the bodies press, and whether Sigma seems to be a graph over it.
+bool PanelSolver::frame_from(const PressureBatch& batch) {
   Vec3 place = Vec3::Zero(), normal = Vec3::Zero();
   std::vector<Vec3>& normals = r_.normal;
   normals.clear();
@@ -520,6 +553,8 @@ void PanelSolver::refine() {
 
 void PanelSolver::hand_over(PatchPoints& points, PanelOutcome& out) {
   out.sums = all_;
+  const double most = job_.overlap.extent().dot(setting_.view.frame.axis[2].cwiseAbs());
+  const auto thickness = [&](const PanelPoint& p, std::size_t side) { return p.fall[side] > 0.0 ? std::min(p.pressure / p.fall[side], most) : most; };
   for (const Panel& panel : r_.panel) {
     out.thirds = out.thirds || panel.thirds != 0;
     for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
@@ -531,36 +566,58 @@ void PanelSolver::hand_over(PatchPoints& points, PanelOutcome& out) {
       points.residual = std::max(points.residual, p.mismatch);
       if (p.pressure <= out.largest) continue;
       out.largest = p.pressure;
-      out.thickness = p.fall[0] > 0.0 && p.fall[1] > 0.0 ? p.pressure / p.fall[0] + p.pressure / p.fall[1] : 0.0;
+      out.thickness = std::min(thickness(p, 0) + thickness(p, 1), most);
     }
   }
 }
 
-/// Whether both bodies reach as far beyond Sigma as the other one's pressure, to first order: where one is thinner, it may have another sheet of Sigma on
-/// its far side.
+/// Whether both bodies reach as far beyond Sigma as the other one's pressure: where one is thinner, it may have another sheet of Sigma on its far side.
 bool PanelSolver::has_one_sheet() {
   constexpr double kOfLargest = 0.05;  // near the rim both end where Sigma does
-  const Vec3& axis = setting_.view.frame.axis[2];
   double largest = 0.0;
   for (const Panel& panel : r_.panel) {
     for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) largest = std::max(largest, r_.arena.point[i].pressure);
   }
-  for (const int side : {0, 1}) {
-    r_.far.clear();
+  for (const std::size_t side : {0u, 1u}) {
+    r_.way.clear();
     for (const Panel& panel : r_.panel) {
       for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
         const PanelPoint& p = r_.arena.point[i];
-        const double fall = p.fall[static_cast<std::size_t>(side)];
         if (p.pressure < kOfLargest * largest) continue;
-        if (!(fall > 0.0)) return false;
-        r_.far.push_back(p.at + (side == 0 ? 1.0 : -1.0) * p.pressure / fall * axis);
+        r_.way.push_back({p.at, p.fall[side] > 0.0 ? p.pressure / p.fall[side] : setting_.view.reach, 0.0, std::numeric_limits<double>::infinity()});
       }
     }
-    r_.value.resize(r_.far.size());
-    job_.pressure.evaluate(1 - side, r_.far, r_.value);
-    if (std::any_of(r_.value.begin(), r_.value.end(), [](double p) { return p <= 0.0; })) return false;
+    if (!ends_first(static_cast<int>(side))) return false;
   }
   return true;
+}
+
+/// Whether along the ways out of a body there is a place beyond the body, and still in the other one. To first order that is where the pressure falls to zero;
+/// where it falls faster farther out, nearer.
+bool PanelSolver::ends_first(int side) {
+  constexpr int kMostSteps = 12;
+  const Vec3 out = (side == 0 ? 1.0 : -1.0) * setting_.view.frame.axis[2];
+  std::vector<double>& own = r_.value;
+  for (int step = 0; step < kMostSteps && !r_.way.empty(); ++step) {
+    r_.far.clear();
+    for (const PanelRoom::Way& way : r_.way) r_.far.push_back(way.from + way.length * out);
+    own.resize(r_.far.size());
+    r_.other.resize(r_.far.size());
+    job_.pressure.evaluate(1 - side, r_.far, r_.other);
+    job_.pressure.evaluate(side, r_.far, own);
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < r_.way.size(); ++i) {
+      PanelRoom::Way way = r_.way[i];
+      const bool inside = own[i] > 0.0, within_other = r_.other[i] > 0.0;
+      if (!inside && within_other) continue;
+      if (inside && !within_other) return false;
+      (inside ? way.low : way.high) = way.length;
+      way.length = std::isfinite(way.high) ? 0.5 * (way.low + way.high) : 2.0 * way.length;
+      r_.way[left++] = way;
+    }
+    r_.way.resize(left);
+  }
+  return r_.way.empty();
 }
 
 /// The first panels. @return false where they do not fit

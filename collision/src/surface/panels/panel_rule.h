@@ -52,9 +52,15 @@ struct PanelRoom {
   std::vector<implicit::Kink> kink;
   std::vector<Vec3> start, normal;     // places that press, in the frame of the rays; normals there
   std::vector<double> start_pressure;  // about that of Sigma near these [Pa]
+  /// Out of a body, from a place of Sigma, and between which lengths the body ends.
+  struct Way {
+    Vec3 from;
+    double length, low, high;
+  };
+  std::vector<Way> way;
   std::vector<Vec3> far;
   PressureBatch batch;
-  std::vector<double> value;
+  std::vector<double> value, other;
 };
 
 /// @param points  receives those of Sigma, and of the squeezed regions that `regions` asks for

@@ -14,6 +14,8 @@ constexpr int kAcross = 3, kAlong = 4;    // Gauss points of a cell, each way, a
 constexpr double kPlacesInFeature = 8.0;  // on a column, to see the pieces of the region
 constexpr double kCellsInFeature = 2.0;   // each way, to see all of it
 constexpr double kFewestPlaces = 16.0, kMostPlaces = 512.0, kFewestCells = 4.0, kMostCells = 32.0;
+// What is smaller than a cell or than what lies between two places is a small share of the region: over the error, and over its root.
+constexpr double kPlacesOfError = 0.64, kCellsOfError = 0.5;
 constexpr std::size_t kMostLeaves = 4096;
 constexpr double kKept = 0.5;           // of the error asked for: what cells that are not quartered may add up to
 constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns
@@ -56,7 +58,8 @@ void SqueezedRegion::find_margins(const Lost& lost, std::span<const Vec3> at) {
 /// Where margins change their sign along the columns, by halving and a straight line through the last two values. Each by itself: pieces of the region
 /// may be thin where what bounds them is not.
 void SqueezedRegion::find_changes(const Lost& lost) {
-  const double places = std::clamp(std::ceil(kPlacesInFeature * length_ / feature_), kFewestPlaces, kMostPlaces), step = length_ / places;
+  const double most = std::min(kMostPlaces, std::ceil(kPlacesOfError / lost.error));
+  const double places = std::max(std::min(std::ceil(kPlacesInFeature * length_ / feature_), most), kFewestPlaces), step = length_ / places;
   const std::size_t steps = static_cast<std::size_t>(places), row = steps + 1, n = from_.size() * row;
   place_.clear();
   for (const Vec3& x : from_) {
@@ -193,9 +196,10 @@ void SqueezedRegion::fill(const Lost& lost, const Box& overlap, const Vec3& acro
   length_ = overlap.extent()[axis];
   feature_ = lost.pressure.feature_size();
   std::array<double, 2> cells{}, width{};
+  const double most = std::min(kMostCells, std::ceil(kCellsOfError / std::sqrt(lost.error)));
   for (std::size_t k = 0; k < 2; ++k) {
     const double range = overlap.extent().dot(across_[k]);
-    cells[k] = std::clamp(std::ceil(kCellsInFeature * range / feature_), kFewestCells, kMostCells);
+    cells[k] = std::max(std::min(std::ceil(kCellsInFeature * range / feature_), most), kFewestCells);
     width[k] = range / cells[k];
   }
   point_.clear();
