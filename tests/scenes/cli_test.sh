@@ -323,6 +323,13 @@ code=$?
 [[ $code == 0 ]] || fault "run with calls that break off: exit $code, $(cat err.txt)"
 cmp plain/meshes.usda broken/meshes.usda && cmp <(sed 's/plain/broken/g' plain.txt) broken.txt || fault 'broken calls changed files or text'
 
+# A report of something else.
+mkdir foreign
+for text in '[' '[1, 2]' '{"frames": 3}' '{"outcome": {}}'; do
+  echo "$text" > foreign/result.json
+  expect 7 'foreign/result.json: expected the report of a run' info foreign
+done
+
 # No more threads, at any moment: a message, or the same run with fewer.
 hash_of() { grep -o '"state_hash": "[0-9a-f]*"' "$1/result.json"; }
 sed 's/^objects:/output: {mesh: [ply, usd], cell: 0.1, images: {size: [64, 48], samples: 1}}\nobjects:/' good.yaml > drawn.yaml
