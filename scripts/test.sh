@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Everything a change must pass: optimised build and tests, the tests under address and undefined-behaviour
-# sanitizers, the fuzz targets for a minute each, a minimal external project on the installed package, and a small film from
-# end to end.
+# sanitizers, the tests of the command line by a tool whose modules core, render and scenes have sanitizers, the fuzz targets for a minute
+# each, a minimal external project on the installed package, and a small film from end to end.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/dependencies.sh"
@@ -45,10 +45,10 @@ if part "build (sanitizers)" "$logs/build_asan.log" configure_and_build asan all
 else
   skip_part "tests (sanitizers)" "no build"
 fi
-if part "build (fuzz targets)" "$logs/build_fuzz.log" configure_and_build fuzz fuzz; then
-  part "fuzz targets" "$logs/fuzz.log" run_tests fuzz || true
+if part "build (sanitized tool, fuzz)" "$logs/build_fuzz.log" configure_and_build fuzz fuzz; then
+  part "sanitized tool, fuzz targets" "$logs/fuzz.log" run_tests fuzz || true
 else
-  skip_part "fuzz targets" "no build"
+  skip_part "sanitized tool, fuzz targets" "no build"
 fi
 
 print_summary

@@ -8,10 +8,12 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <system_error>
 #include <typeinfo>
 
 #include "supple/core/error.h"
 #include "supple/core/io/open_temporaries.h"
+#include "supple/core/out_of_threads.h"
 #include "supple/scenes/run.h"
 
 namespace supple::tool {
@@ -35,18 +37,21 @@ void say(const char* text) { static_cast<void>(!::write(STDERR_FILENO, text, std
   const std::type_info* type = abi::__cxa_current_exception_type();
   // Functions of the standard library that may not throw, as those that list folders, do not tell what they could not throw.
   const bool no_memory = type != nullptr ? *type == typeid(std::bad_alloc) || *type == typeid(std::bad_array_new_length) : ran_out.load();
-  say(no_memory ? scenes::kOutOfMemory : "internal fault: an exception that no code could handle");
-  if (!no_memory && type != nullptr) {
+  const bool no_thread = type != nullptr && *type == typeid(std::system_error);  // of std::thread
+  say(no_memory ? scenes::kOutOfMemory : no_thread ? kOutOfThreads : "internal fault: an exception that no code could handle");
+  if (!no_memory && !no_thread && type != nullptr) {
     say(": ");
     say(type->name());
   }
   say("\n");
   io::remove_open_temporaries();
-  _exit(static_cast<int>(no_memory ? ErrorKind::Limit : ErrorKind::Internal));
+  _exit(static_cast<int>(no_memory || no_thread ? ErrorKind::Limit : ErrorKind::Internal));
 }
 
-/// Libraries make objects before main, where nobody can catch what they throw: before those.
-[[gnu::constructor(101)]] void begin() { std::set_terminate(end_program); }
+/// Libraries make objects and start threads before main, where nobody can catch what they throw. This comes before all of them, as constructors of
+/// a program come after those of its libraries.
+void begin() { std::set_terminate(end_program); }
+[[gnu::section(".preinit_array"), gnu::used]] void (*const before_libraries)() = begin;
 
 }  // namespace
 

@@ -59,12 +59,14 @@ void on_signal(int number) {
 
 void ignore(int /*number*/) {}
 
-/// A handler instead of SIG_IGN for pipes that are closed at the other end, as programs that are started would inherit that.
+/// Handlers instead of SIG_IGN for pipes that are closed at the other end and for files that exceed the limit of the system, as programs that
+/// are started would inherit that: the call fails.
 void heed_signals() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   std::signal(SIGALRM, end_if_late);
   std::signal(SIGPIPE, ignore);
+  std::signal(SIGXFSZ, ignore);
 }
 
 /// @throws Error{Io} where the output could not be written

@@ -6,12 +6,14 @@
 #include <charconv>
 #include <chrono>
 #include <optional>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
+#include "supple/core/out_of_threads.h"
 
 namespace supple::tool {
 namespace {
@@ -187,7 +189,11 @@ Response ViewServer::Impl::answer(const Request& request) try {
 ViewServer::ViewServer(scenes::Scene scene, Settings settings) : impl_(std::make_unique<Impl>(std::move(scene), std::move(settings))) {
   impl_->listen();
   impl_->accept();
-  impl_->thread = std::thread([impl = impl_.get()] { impl->context.run(); });
+  try {
+    impl_->thread = std::thread([impl = impl_.get()] { impl->context.run(); });
+  } catch (const std::system_error&) {
+    throw_out_of_threads();
+  }
 }
 
 ViewServer::~ViewServer() {

@@ -1,11 +1,15 @@
 #!/usr/bin/env bash
 # The command line as users meet it: exit codes, the first words of messages, and nothing half-written.
-#   cli_test.sh SUPPLE SCRATCH BROKEN_CALLS   the last: a library to load first, with which signals break calls of the system off
+#   cli_test.sh SUPPLE SCRATCH BROKEN_CALLS FEW_THREADS
+# The last two are libraries to load first: with one signals break calls of the system off, with the other it starts few threads.
 set -u
 supple=$1
 scratch=$2
 hostile=$(cd "$(dirname "$0")" && pwd)/hostile
 broken_calls=$3
+few_threads=$4
+# The address sanitizer reserves terabytes of addresses.
+limit_memory() { nm -D "$supple" 2> /dev/null | grep -q __asan_init || ulimit -v 1000000; }
 rm -rf "$scratch"
 mkdir -p "$scratch"
 cd "$scratch" || exit 1
@@ -266,10 +270,10 @@ done
 rm -r "$escape"
 # Sizes and kinds before content: a large file that is no state is not read.
 truncate -s 3G large
-(ulimit -v 1000000; "$supple" query forces good.yaml --state large > out.txt 2> err.txt)
+(limit_memory; "$supple" query forces good.yaml --state large > out.txt 2> err.txt)
 code=$?
 [[ $code == 7 ]] && grep -qF 'another kind of file' err.txt || fault "query --state of a large file: exit $code, $(cat err.txt)"
-(ulimit -v 1000000; "$supple" query field good.yaml --points large > out.txt 2> err.txt)
+(limit_memory; "$supple" query field good.yaml --points large > out.txt 2> err.txt)
 code=$?
 [[ $code == 6 ]] || fault "query --points of a large file: exit $code, $(cat err.txt)"
 rm large
@@ -318,6 +322,33 @@ LD_PRELOAD=$broken_calls "$supple" run meshes.yaml --out broken --progress none 
 code=$?
 [[ $code == 0 ]] || fault "run with calls that break off: exit $code, $(cat err.txt)"
 cmp plain/meshes.usda broken/meshes.usda && cmp <(sed 's/plain/broken/g' plain.txt) broken.txt || fault 'broken calls changed files or text'
+
+# A report of something else.
+mkdir foreign
+for text in '[' '[1, 2]' '{"frames": 3}' '{"outcome": {}}'; do
+  echo "$text" > foreign/result.json
+  expect 7 'foreign/result.json: expected the report of a run' info foreign
+done
+
+# No more threads, at any moment: a message, or the same run with fewer.
+hash_of() { grep -o '"state_hash": "[0-9a-f]*"' "$1/result.json"; }
+sed 's/^objects:/output: {mesh: [ply, usd], cell: 0.1, images: {size: [64, 48], samples: 1}}\nobjects:/' good.yaml > drawn.yaml
+for ((left = 0; left < 16; ++left)); do
+  rm -rf few
+  SUPPLE_THREADS_LEFT=$left LD_PRELOAD=$few_threads timeout --signal=KILL 60 "$supple" run drawn.yaml --out few --threads 3 --progress none > out.txt 2> err.txt
+  code=$?
+  [[ $code == 0 && $(hash_of few) == "$(hash_of plain)" ]] || { [[ $code == 6 ]] && grep -q '^threads: ' err.txt; } ||
+    fault "run with $left threads: exit $code, $(cat err.txt)"
+  SUPPLE_THREADS_LEFT=$left LD_PRELOAD=$few_threads "$supple" check meshes.yaml > out.txt 2> err.txt
+  code=$?
+  [[ $code == 0 ]] || { [[ $code == 6 ]] && grep -q '^threads: ' err.txt; } || fault "check with $left threads: exit $code, $(cat err.txt)"
+done
+
+# A limit of the system for the size of files.
+(ulimit -f 8; "$supple" run meshes.yaml --out large --progress none > out.txt 2> err.txt)
+code=$?
+[[ $code == 4 ]] && grep -qF 'File too large' err.txt || fault "run with a limit of file sizes: exit $code, $(cat err.txt)"
+[[ -z $(find large -name '*.tmp') ]] || fault 'a limit of file sizes leaves temporary files'
 
 # ffmpeg ends with the run, and what it was writing goes.
 sed 's/^objects:/output: {images: {size: [64, 48], samples: 1}, film: true}\nobjects:/' good.yaml > film.yaml

@@ -12,7 +12,9 @@ failures=0
 most_seconds=1.0     # of processor time beyond what the program takes to start; times SUPPLE_TEST_SLOWNESS, for sanitizers
 most_kilobytes=262144  # resident
 slowness=${SUPPLE_TEST_SLOWNESS:-1}
-nm -D "$supple" 2> /dev/null | grep -q -e __asan_init -e __tsan_init && slowness=20
+# Sanitizers need more memory, too, and what they build in the time of a check is less: an answer that says so is one.
+sanitized=$(nm -D "$supple" 2> /dev/null | grep -c -e __asan_init -e __tsan_init)
+((sanitized > 0)) && slowness=20 most_kilobytes=$((4 * most_kilobytes))
 
 most=$(awk "BEGIN {print $most_seconds * $slowness}")
 
@@ -50,6 +52,7 @@ for scene in *.yaml; do
   seconds=$(sed -n 2p <<< "$answer")
   found=$(sed -n '3,4p' <<< "$answer")
   any=$(grep -c '^any answer$' "$name.txt" 2> /dev/null)
+  ((sanitized > 0)) && [[ $found == *'takes more than the limits of a check'* ]] && any=1
   if [[ $write == --write && $any != 1 ]]; then
     printf '%s\n' "$found" > "$name.txt"
   fi

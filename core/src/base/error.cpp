@@ -33,10 +33,12 @@ std::vector<Fault> require_some(std::vector<Fault> faults) {
   return faults;
 }
 
-/// Of a valid character: C1 controls start sequences on some terminals, as ESC does.
+/// Of a valid character: C1 controls start sequences on some terminals, as ESC does; those of U+2028 to U+202E and U+2066 to U+2069
+/// separate lines and change the order in which a terminal shows what follows.
 bool is_control(std::string_view character) {
-  const auto first = static_cast<unsigned char>(character.front());
-  return first < 0x20U || first == 0x7FU || (first == 0xC2U && static_cast<unsigned char>(character[1]) < 0xA0U);
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(character[k]); };
+  if (byte(0) == 0xE2U) return (byte(1) == 0x80U && byte(2) >= 0xA8U && byte(2) <= 0xAEU) || (byte(1) == 0x81U && byte(2) >= 0xA6U && byte(2) <= 0xA9U);
+  return byte(0) < 0x20U || byte(0) == 0x7FU || (byte(0) == 0xC2U && byte(1) < 0xA0U);
 }
 
 }  // namespace

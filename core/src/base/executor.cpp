@@ -13,15 +13,21 @@
 #include <limits>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
+#include "supple/core/out_of_threads.h"
 
 namespace supple {
 namespace {
+
+/// TBB names the call of the system that failed.
+bool lacks_threads(const std::runtime_error& error) { return std::string_view(error.what()).find("pthread_create") != std::string_view::npos; }
 
 int machine_threads() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
@@ -107,25 +113,35 @@ void Executor::for_blocks(std::size_t n, std::size_t block,
     std::atomic<bool> begun{false};
     std::atomic<std::size_t> done{0};
     begun.store(true, std::memory_order_release);
-    impl_->arena.execute([&] {
-      tbb::parallel_for(
-          tbb::blocked_range<std::size_t>(0, workers, 1),
-          [&](const tbb::blocked_range<std::size_t>&) {
-            static_cast<void>(begun.load(std::memory_order_acquire));
-            const auto own = static_cast<std::size_t>(tbb::this_task_arena::current_thread_index());
-            for (std::size_t k = 0; k < count; ++k) {
-              Share& share = shares[(own + k) % count];
-              for (std::size_t index; (index = share.next.fetch_add(1, std::memory_order_relaxed)) < share.end;) run_block(index);
-            }
-            done.fetch_add(1, std::memory_order_release);
-          },
-          tbb::simple_partitioner());
-    });
+    const auto work = [&](std::size_t own) {
+      static_cast<void>(begun.load(std::memory_order_acquire));
+      for (std::size_t k = 0; k < count; ++k) {
+        Share& share = shares[(own + k) % count];
+        for (std::size_t index; (index = share.next.fetch_add(1, std::memory_order_relaxed)) < share.end;) run_block(index);
+      }
+      done.fetch_add(1, std::memory_order_release);
+    };
+    try {
+      impl_->arena.execute([&] {
+        tbb::parallel_for(
+            tbb::blocked_range<std::size_t>(0, workers, 1),
+            [&](const tbb::blocked_range<std::size_t>&) { work(static_cast<std::size_t>(tbb::this_task_arena::current_thread_index())); },
+            tbb::simple_partitioner());
+      });
+    } catch (const std::runtime_error& error) {  // blocks keep theirs
+      if (!lacks_threads(error)) throw;
+      work(0);  // the machine has no more threads: this one does what is left
+    }
     static_cast<void>(done.load(std::memory_order_acquire));
   }
   failure.rethrow();
 }
 
-void Executor::run(const std::function<void()>& body) const { impl_->arena.execute([&] { body(); }); }
+void Executor::run(const std::function<void()>& body) const try {
+  impl_->arena.execute([&] { body(); });
+} catch (const std::runtime_error& error) {
+  if (!lacks_threads(error)) throw;
+  throw_out_of_threads();
+}
 
 }  // namespace supple

@@ -2,7 +2,14 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
+#include <latch>
+#include <system_error>
+#include <thread>
+#include <vector>
+
 #include "supple/core/error.h"
+#include "supple/core/out_of_threads.h"
 
 namespace supple::render {
 
@@ -28,7 +35,26 @@ void Library::fail(const std::string& statement) const {
                                    .hint = std::string("apt-get install ") + package_});
 }
 
+namespace {
+
+/// Drivers of software wait for ever for threads that the system did not start: starts as many beforehand.
+void expect_threads() {
+  constexpr unsigned kMost = 32, kOthers = 4;  // one for each processor, and those that write caches
+  std::latch tried(1);
+  std::vector<std::jthread> threads;
+  try {
+    for (unsigned k = 0; k < std::min(kMost, std::thread::hardware_concurrency()) + kOthers; ++k) threads.emplace_back([&tried] { tried.wait(); });
+  } catch (const std::system_error&) {
+    tried.count_down();
+    throw_out_of_threads();
+  }
+  tried.count_down();
+}
+
+}  // namespace
+
 std::unique_ptr<GlContext> make_gl_context(ContextKind kind) {
+  expect_threads();
   return kind == ContextKind::Egl ? make_egl_context() : make_osmesa_context();
 }
 

@@ -36,7 +36,8 @@ class CurrentContext {
   GlContext& context_;
 };
 
-/// OpenGL 4.5 core, or 3.3 core where that is all there is. @throws Error{Io} naming the library and its package.
+/// OpenGL 4.5 core, or 3.3 core where that is all there is. @throws Error{Io} naming the library and its package; Error{Limit} where the system
+/// starts no more threads, for which drivers would wait.
 [[nodiscard]] std::unique_ptr<GlContext> make_gl_context(ContextKind kind);
 [[nodiscard]] std::unique_ptr<GlContext> make_osmesa_context();
 [[nodiscard]] std::unique_ptr<GlContext> make_egl_context();

@@ -97,7 +97,7 @@ void fields(Archive& archive, GroundDesc& d) {
   archive("visible", d.visible, {}, "whether it is drawn");
   archive("collides", d.collides, {}, "whether it touches the objects that have contact");
   archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is P times slope times depth");
-  archive("slope", d.slope, above(0.0, kSlope), "of its field");
+  archive("slope", d.slope, above(0.0, kSlope), "of its field; that of an object is about the inverse of its size, and a default that is more than 10 times softer than an object that may touch it gives a warning");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient");
 }
 
@@ -132,7 +132,7 @@ void fields(Archive& archive, ObstacleDesc& d) {
   archive("smooth_deg", d.smooth, only(degrees(0.0, 180.0), {ObstacleName::Mesh}), "pictures show edges whose faces differ by less than this angle smooth; 0: all are sharp");
   archive("visible", d.visible, {}, "whether it is drawn");
   archive("modulus", d.modulus, above(0.0, kPressure), "P: pressure is P times slope times depth; of an implicit obstacle P (f - iso)");
-  archive("slope", d.slope, only(above(0.0, kSlope), {Plane, Box, Heights, ObstacleName::Mesh}), "of its field");
+  archive("slope", d.slope, only(above(0.0, kSlope), {Plane, Box, Heights, ObstacleName::Mesh}), "of its field; that of an object is about the inverse of its size, and a default that is more than 10 times softer than an object that may touch it gives a warning");
   archive("friction", d.friction, between(0.0, 100.0, kNumber), "Coulomb coefficient");
   for (std::size_t k = 0; k < d.keys.size(); ++k) {
     const std::string key = "keys[" + std::to_string(k) + ']';

@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <numbers>
 
+#include "supple/core/printable.h"
+
 namespace supple::scenes {
 namespace {
 
@@ -347,7 +349,7 @@ void ReadArchive::read(const Node& node, const std::string& path, std::string& v
   if (node.kind != Node::Kind::Scalar) {
     fault(node, path, rule.name ? "expected a name" : "expected text", "");
   } else if (rule.file && !may_name(files_, node.text)) {
-    fault(node, path, kInsideFolder, kAllowHint);
+    fault(node, path, kInsideFolder, printable(node.text) == node.text ? kAllowHint : "names of files have no control characters");
   } else if (has_controls(node.text)) {
     fault(node, path, "expected text without control characters", "");
   } else if (rule.name && !is_identifier(node.text)) {

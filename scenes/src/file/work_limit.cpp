@@ -4,8 +4,10 @@
 
 #include <chrono>
 #include <fstream>
+#include <system_error>
 
 #include "supple/core/cpu_time.h"
+#include "supple/core/out_of_threads.h"
 
 namespace supple::scenes {
 namespace {
@@ -20,7 +22,10 @@ double resident_bytes() {
 }  // namespace
 
 WorkLimit::WorkLimit(double seconds, double bytes, const std::atomic<int>* outer)
-    : watcher_([this, last_second = process_cpu_seconds() + seconds, last_byte = resident_bytes() + bytes, outer] { watch(last_second, last_byte, outer); }) {}
+try : watcher_([this, last_second = process_cpu_seconds() + seconds, last_byte = resident_bytes() + bytes, outer] { watch(last_second, last_byte, outer); }) {
+} catch (const std::system_error&) {
+  throw_out_of_threads();
+}
 
 WorkLimit::~WorkLimit() {
   {

@@ -14,6 +14,7 @@ namespace supple::scenes {
 class WorkLimit {
  public:
   /// @param seconds  of processor time   @param bytes  of resident memory   @param outer  another interrupt, which is passed on; outlives this, or null
+  /// @throws Error{Limit} where the system starts no more threads
   WorkLimit(double seconds, double bytes, const std::atomic<int>* outer);
   ~WorkLimit();
   WorkLimit(const WorkLimit&) = delete;

@@ -40,7 +40,7 @@ ordered_json read_report(const fs::path& folder) {
   const std::vector<std::byte> bytes = io::read_file(path, kLargestReport);
   const char* text = reinterpret_cast<const char*>(bytes.data());
   ordered_json report = ordered_json::parse(text, text + bytes.size(), nullptr, false);
-  if (!report.is_object()) fail(ErrorKind::Corrupt, path, "expected the report of a run", "something else");
+  if (!report.is_object() || !report.contains("outcome") || !report["outcome"].is_string()) fail(ErrorKind::Corrupt, path, "expected the report of a run", "something else");
   return report;
 }
 

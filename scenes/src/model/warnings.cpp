@@ -127,6 +127,54 @@ void add_mended_meshes(const Model& model, std::vector<std::string>& warnings) {
   }
 }
 
+/// Growth of an object's pressure with the depth, at most [Pa/m].
+double steepness(const ObjectModel& object) {
+  double largest = 0.0;
+  for (const implicit::Primitive& primitive : object.skeleton.primitive) {
+    largest = std::max(largest, implicit::iso_slope(primitive.kernel, object.skeleton.iso) * implicit::distance_scale(primitive));
+  }
+  return object.material.modulus * largest;
+}
+
+/// Compares an obstacle with the stiffest object that may touch it. @param slope  growth of the pressure over the modulus [1/m]
+void look_for_softness(const Model& model, std::size_t fixed, const std::string& key, double slope, std::vector<std::string>& warnings) {
+  constexpr double kMuch = 10.0;
+  const FixedBody& body = model.fixed[fixed];
+  const ObjectModel* stiffest = nullptr;
+  double most = 0.0;
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    const auto a = static_cast<std::uint32_t>(i), b = static_cast<std::uint32_t>(model.objects.size() + fixed);
+    const ObjectModel& object = model.objects[i];
+    if (!object.collides || (model.rules.allowed && !model.rules.allowed(a, b)) || steepness(object) <= most) continue;
+    stiffest = &object;
+    most = steepness(object);
+  }
+  const double own = body.material.modulus * slope;
+  if (stiffest == nullptr || most <= kMuch * own) return;
+  const bool has_slope = !std::holds_alternative<FixedBody::Primitives>(body.solid);
+  const double as_stiff = has_slope ? most / body.material.modulus : most / slope;
+  warnings.push_back(key + (has_slope ? ".slope: '" : ".modulus: '") + body.name + "' is " + short_text(most / own) + " times softer than '" +
+                     stiffest->name + "', which sinks into it: the pressure grows by " + short_text(own) + " Pa per metre of depth in it, by " +
+                     short_text(most) + " in '" + stiffest->name + "'; a " + (has_slope ? "slope" : "modulus") + " of " + short_text(as_stiff) +
+                     " makes it as stiff");
+}
+
+/// Obstacles of the default stiffness, which follows neither the size nor the stiffness of the objects. A given one is meant.
+void add_soft_obstacles(const Scene& scene, const Model& model, std::vector<std::string>& warnings) {
+  std::size_t fixed = 0;
+  if (scene.ground && scene.ground->collides) {
+    if (scene.ground->slope == GroundDesc{}.slope) look_for_softness(model, fixed, "ground", scene.ground->slope, warnings);
+    ++fixed;
+  }
+  for (const ObstacleDesc& d : scene.obstacles) {
+    const bool primitives = d.shape == ObstacleName::Implicit;
+    const bool given = primitives ? d.modulus != ObstacleDesc{}.modulus : d.slope != ObstacleDesc{}.slope;
+    const implicit::FieldView field = model.fixed[fixed].field();
+    if (!given) look_for_softness(model, fixed, "obstacles." + d.name, primitives ? field.gradient_bound(field.surface_box()) : d.slope, warnings);
+    ++fixed;
+  }
+}
+
 /// Checks a spacing of contact samples given by the scene [m].
 void add_wide_samples(const Model& model, double spacing, std::vector<std::string>& warnings) {
   const std::string key = "contact.sample_spacing: ";
@@ -198,6 +246,7 @@ std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& 
   add_without_surface(context, particles, frame, warnings);
   add_missed(context.model, warnings);
   add_mended_meshes(context.model, warnings);
+  add_soft_obstacles(scene, context.model, warnings);
   add_idle(scene, context.model, warnings);
   if (scene.contact.sample_spacing) add_wide_samples(context.model, *scene.contact.sample_spacing, warnings);
   return warnings;

@@ -15,8 +15,8 @@ namespace supple::scenes {
 [[nodiscard]] bool begins_deep(const std::vector<Body>& bodies, const Frame& frame, const collision::BodyPair& pair);
 
 /// Warnings about the initial state: bodies deep in one another, parts of an object that pass through each other, objects without a
-/// surface, cells and samples of contact that miss objects, meshes of obstacles that are modified, and keys
-/// without an effect.
+/// surface, cells and samples of contact that miss objects, meshes of obstacles that are modified, obstacles of the default stiffness
+/// that are far softer than objects, and keys without an effect.
 /// @param frame  of the contacts at the start
 [[nodiscard]] std::vector<std::string> find_odd_start(const Scene& scene, const StageContext& context, const core::ParticleState& particles,
                                                       Frame& frame);

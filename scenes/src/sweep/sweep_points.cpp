@@ -186,7 +186,11 @@ class PointRunner {
     const std::size_t jobs = std::min<std::size_t>(options_.jobs > 0 ? static_cast<std::size_t>(options_.jobs) : processors, plan_.points.size());
     {
       std::vector<std::jthread> workers;
-      for (std::size_t k = 0; k < jobs; ++k) workers.emplace_back([this] { work(); });
+      try {
+        for (std::size_t k = 0; k < jobs; ++k) workers.emplace_back([this] { work(); });
+      } catch (const std::system_error&) {  // the machine has no more threads: this one helps those that began
+        work();
+      }
     }
     if (failure_) std::rethrow_exception(failure_);
     heed(options_.interrupt);

@@ -33,6 +33,9 @@ TEST(Faults, ShowWhatATerminalWouldObeyByItsBytes) {
 
 TEST(Faults, ShowControlsBeyondAsciiByTheirBytes) {
   EXPECT_EQ(printable("a\u009b31m\u0085 \u00a0\u00e9"), "a\\xc2\\x9b31m\\xc2\\x85 \u00a0\u00e9");
+  // Right-to-left override and isolate, line separator; their neighbours are printed.
+  EXPECT_EQ(printable("\u202e\u2066\u2069\u2028"), "\\xe2\\x80\\xae\\xe2\\x81\\xa6\\xe2\\x81\\xa9\\xe2\\x80\\xa8");
+  EXPECT_EQ(printable("\u2027\u202f\u2065\u206a"), "\u2027\u202f\u2065\u206a");
 }
 
 TEST(Errors, HoldAllFaultsAndTheirKind) {

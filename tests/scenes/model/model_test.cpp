@@ -224,6 +224,36 @@ TEST(Warnings, TellWhatIsOddAtTheStart) {
   EXPECT_NE(thin[0].find("'a' may have no surface"), std::string::npos) << thin[0];
 }
 
+// The slope of wyvill at its iso distance d = (1 - 2^(-1/3))^(1/2) R is 6 (d / R) 2^(-2/3) / R = 1.71678 / R.
+TEST(Warnings, TellOfObstaclesThatAreFarSofterThanWhatTouchesThem) {
+  const auto warnings_of = [](const std::string& size, const std::string& contact, const std::string& obstacles) {
+    return Simulation(parse_scene("schema: 1\nduration: 1 s\n" + obstacles + "objects:\n  - {name: a, particles: {at: [0, 0, " + size +
+                                      "]}, skeleton: [{shape: point, kernel: {radius: " + size + "}}], contact: {" + contact + "}}\n",
+                                  "test.yaml", ".")).warnings();
+  };
+  EXPECT_TRUE(warnings_of("0.1", "", "ground: {}\n").empty());
+  EXPECT_TRUE(warnings_of("1.75 mm", "", "ground: {}\n").empty());  // 9.8 times softer
+  const std::string ground = "ground.slope: 'ground' is 17167.8 times softer than 'a', which sinks into it: the pressure grows by 1e+06 Pa per metre of depth "
+                             "in it, by 1.71678e+10 in 'a'; a slope of 17167.8 makes it as stiff";
+  EXPECT_EQ(warnings_of("0.001 mm", "", "ground: {}\n"), std::vector<std::string>{ground});
+  EXPECT_TRUE(warnings_of("0.001 mm", "", "ground: {slope: 17167.8}\n").empty());
+  EXPECT_TRUE(warnings_of("0.001 mm", "", "ground: {slope: 2}\n").empty());  // a given slope is meant
+  EXPECT_TRUE(warnings_of("0.001 mm", "", "ground: {collides: false}\n").empty());
+  EXPECT_TRUE(warnings_of("0.001 mm", "", "ground: {}\npairs: [{objects: [a, ground], collide: false}]\n").empty());
+  const auto box = warnings_of("0.1", "modulus: 1e9", "ground: {collides: false}\nobstacles: [{name: step, shape: box, at: [0, 0, -2], half_sizes: [1, 1, 1]}]\n");
+  ASSERT_EQ(box.size(), 1u);
+  EXPECT_NE(box[0].find("obstacles.step.slope: 'step' is 17167.8 times softer than 'a'"), std::string::npos) << box[0];
+  // Primitives have the slope of their kernels: their modulus decides.
+  const auto bar = [&](const std::string& modulus) {
+    return warnings_of("0.1", "modulus: 1e9", "obstacles: [{name: bar, shape: implicit, at: [0, 0, -3]" + modulus +
+                       ", skeleton: [{shape: segment, half_length: 1, kernel: {radius: 0.1}}]}]\n");
+  };
+  const auto soft = bar("");
+  ASSERT_EQ(soft.size(), 1u);
+  EXPECT_NE(soft[0].find("obstacles.bar.modulus: 'bar' is "), std::string::npos) << soft[0];
+  EXPECT_TRUE(bar(", modulus: 1e5").empty());
+}
+
 TEST(Warnings, TellOfSamplesThatAreTooFarApartOrOfNoUse) {
   const auto warnings_of = [](const std::string& spacing, const std::string& shape, const std::string& obstacles = "") {
     return Simulation(parse_scene("schema: 1\nduration: 1 s\nground: {}\ncontact: {sample_spacing: " + spacing + "}\n" + obstacles +

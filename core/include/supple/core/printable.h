@@ -7,7 +7,8 @@
 
 namespace supple {
 
-/// The text with control characters (C0, DEL and C1) and invalid UTF-8 as `\xNN`: names and contents of files may hold anything.
+/// The text with control characters (C0, DEL, C1, separators of lines and controls of the direction) and invalid UTF-8 as `\xNN`: names and
+/// contents of files may hold anything.
 [[nodiscard]] std::string printable(std::string_view text);
 
 }  // namespace supple
