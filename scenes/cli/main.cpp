@@ -165,6 +165,7 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.simulate_only = arguments.simulate_only;
   options.no_pictures = arguments.no_pictures;
   options.profile = arguments.profile;
+  options.estimate_errors = !arguments.preview;
   options.context = arguments.context;
   options.frames_at_once = arguments.at_once;
   options.memory = arguments.memory;
@@ -441,7 +442,7 @@ int parse_and_call(int argc, char** argv, bool silent) {
   run_verb->add_flag("--render-only", a.render_only, "draw pictures and film from the saved states of an earlier run, as `supple render` does");
   run_verb->add_flag("--dry-run", a.dry_run, "print particles, steps, triangles, memory, disk and time that the run would take, from a sample of its frames; writes nothing")
       ->excludes("--render-only")->excludes("--resume")->excludes("--overwrite");
-  run_verb->add_flag("--preview", a.preview, "a quick film: pictures of a quarter of the size, 12 frames per second or a little more, coarse meshes and contact; the folder is out/NAME_preview")
+  run_verb->add_flag("--preview", a.preview, "a quick film: pictures of a quarter of the size, 8 to 24 frames per second, coarse meshes and contact, no estimates of errors; the folder is out/NAME_preview")
       ->excludes("--render-only")->excludes(from_frame);
   run_verb->footer(std::string(kFilmRule) +
                    "With --frames a run ends after the last of them; result.json holds its last frame, and --resume continues from there.\n\n"

@@ -35,6 +35,12 @@ class EmbeddingPage(unittest.TestCase):
         result = run_tool("contacts/two_balls", "--set", "objects.left.particles.mass=0.3")
         self.assertEqual(printed.split()[-1], result["state_hash"])
 
+    def test_has_the_program_of_an_example(self):
+        programs = re.findall(r"```cpp\n(.*?)```", (SOURCE / "docs/embedding.md").read_text(), re.DOTALL)
+        example = (SOURCE / "examples/cpp/contact_of_two.cpp").read_text()
+        self.assertEqual(programs[1], example[example.index("#include"):])
+        self.assertLessEqual(programs[1].split("int main() {\n")[1].count("\n"), 10)
+
 
 class PythonPage(unittest.TestCase):
     def test_has_examples_that_run(self):

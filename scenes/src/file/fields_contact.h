@@ -74,7 +74,7 @@ void fields(Archive& archive, ContactDesc& d) {
   archive("bulge_volume", d.bulge_volume, {}, "instead of 'bulge': bulges hold the volume that the contact displaces, to 1e-3 of it; a warning names the contacts where the fields or 'bulge_width' do not allow it");
   archive("bulge_width", d.bulge_width, up_to(1.0, kNumber).or_auto(), "largest width of the bulge over the feature size of the other body; auto: 0.15, or as wide as 'bulge_volume' needs");
   archive("bulge_literal", d.bulge_literal, {}, "bulge as published (Gascuel 1993): by distance instead of pressure, of one width; it jumps up at first touch, and bulges may cross");
-  archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "distance between surface samples; auto: a sixth of the thickness, primitive by primitive");
+  archive("sample_spacing", d.sample_spacing, above(0.0, kLength).or_auto(), "distance between surface samples; auto: a sixth of the thickness, primitive by primitive, or a third where contact.error is 5e-2 or more");
   const bool bulges = archive.given("bulge") || archive.given("bulge_volume");
   for (const char* key : {"bulge_width", "bulge_literal"}) {
     archive.check(bulges || !archive.given(key), key, "expected 'bulge' or 'bulge_volume' beside it", "neither", "add one of the two");

@@ -20,6 +20,8 @@ namespace {
 using collision::BodyPair;
 
 constexpr double kSamplesAcross = 6.0;  // of the smallest thickness
+constexpr double kRoughAcross = 3.0;    // the same, where contact.error is kRough or more
+constexpr double kRough = 5e-2;
 
 /// x - ln(1 + x) for x > -1, without cancellation near 0.
 double lag(double x) {
@@ -361,14 +363,15 @@ double seeds_of(const implicit::Primitive& primitive, double iso, double spacing
 }
 
 /// Spacing of the samples of each primitive: that of the scene, or a sixth of the thinnest of the primitive and the obstacles, which have no samples. What is
-/// thin on another object is seen by that object's own samples.
+/// thin on another object is seen by that object's own samples. Rough contacts take a third instead: each sample searches as far as the next one.
 std::vector<double> sample_spacings(const Scene& scene, const Model& model, const ObjectModel& object) {
   double solids = std::numeric_limits<double>::infinity();
   for (const FixedBody& body : model.fixed) solids = std::min(solids, body.iso_radius);
+  const double across = contact_error(scene) < kRough ? kSamplesAcross : kRoughAcross;
   std::vector<double> out;
   for (const implicit::Primitive& primitive : object.skeleton.primitive) {
     const double thinnest = std::min(iso_radius(primitive, object.skeleton.iso), solids);
-    out.push_back(scene.contact.sample_spacing.value_or(2.0 * thinnest / kSamplesAcross));
+    out.push_back(scene.contact.sample_spacing.value_or(2.0 * thinnest / across));
   }
   return out;
 }

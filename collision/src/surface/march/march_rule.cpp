@@ -18,6 +18,8 @@ namespace {
 constexpr double kOnSigma = 1e-9, kOnSigmaAtBest = 1e-12;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr int kMostHalvings = 4;       // of the cells of a mesh at which something presses
+constexpr int kRoughHalvings = 1;      // the same, where an error of kRough or more is asked for
+constexpr double kRough = 5e-2;
 constexpr double kBeside = 2.0;        // from where it presses, in triangles: others need not be smooth
 constexpr double kBesideEnd = 0.7;     // the same at the end of both supports; not beyond the cells that are there in every view
 constexpr double kSmallest = 1.0 / 512.0;  // cell, over the features, for small patches
@@ -414,7 +416,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
 
 /// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press. @return whether there were not too many cells
 bool MarchRuleSolver::lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
-                               const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat) {
+                               const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat, int most_halvings) {
   const auto mesh = [&] {
     heed_scope();
     return mesher_.mesh(pressure, overlap, cell_, axis, flat, mesh_) && mesh_.triangle.size() <= kMostPieces / 2;
@@ -446,7 +448,7 @@ bool MarchRuleSolver::lay_mesh(PairPressure& pressure, std::span<const ContactBo
     return std::any_of(c.begin(), c.end(), [this](std::uint32_t v) { return mesh_.at_end[v] != 0; });
   };
   const auto fits = [&](const Piece& p) { return at_end(p) ? !presses_within(p, kBesideEnd) : smooth(p) || !presses_within(p, kBeside); };
-  for (int halvings = 0; halvings < kMostHalvings && !coarse; ++halvings) {
+  for (int halvings = 0; halvings < most_halvings && !coarse; ++halvings) {
     if (std::all_of(pieces_.begin(), pieces_.end(), fits)) break;
     halve();
   }
@@ -481,7 +483,7 @@ bool MarchRuleSolver::solve(const Job& job, PatchPoints& points) {
   bool fine = false;
   const auto solve_on = [&](const std::optional<FlatCells>& cells) {
     on_sigma_ = kOnSigma;
-    fine = lay_mesh(pressure, third, overlap, job.axis, cells);
+    fine = lay_mesh(pressure, third, overlap, job.axis, cells, limits.error < kRough ? kMostHalvings : kRoughHalvings);
     on_sigma_ = std::max(std::clamp(1e-2 * limits.error, kOnSigmaAtBest, kOnSigma), 64.0 * kEpsilon * coordinates / cell_);
     return refine(pressure, third, limits, job.reference);
   };

@@ -176,7 +176,7 @@ class MarchRuleSolver {
   [[nodiscard]] bool smooth(const Piece& piece) const;
   [[nodiscard]] bool may_press(const PairPressure& pressure, const Piece& piece) const;
   bool lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const std::optional<CommonAxis>& axis,
-                const std::optional<FlatCells>& flat);
+                const std::optional<FlatCells>& flat, int most_halvings);
   void begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces);
   static std::optional<double> turn(const Piece& piece, std::size_t across);
   void split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to);

@@ -9,11 +9,12 @@
 
 namespace supple::scenes {
 
-/// Of so many frames the preview shows one: a power of two, such that 12 frames per second or more stay, and 13 frames or more in all.
+/// Of so many frames the preview shows one: a power of two, such that 12 frames per second or more stay, and 10 frames or more in all;
+/// half as many again where 8 frames per second or more stay then, and 13 frames or more.
 [[nodiscard]] int preview_stride(const Scene& scene);
 
 /// Overrides as of `--set` with which the scene is read again as its preview: pictures of a quarter of the size with one sample a pixel by OpenGL,
-/// lattice cells twice as long, contact.error at least 3e-2, accuracy 4e-2 where the scene leaves its steps open; every `preview_stride`-th frame; no other
+/// lattice cells three times as long, contact.error 0.1, accuracy 4e-2 where the scene leaves its steps open; every `preview_stride`-th frame; no other
 /// files. Times and cameras stay.
 /// @throws as `build_model`, which gives the lattice cells
 [[nodiscard]] std::vector<std::string> preview_overrides(const Scene& scene);

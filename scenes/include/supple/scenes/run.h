@@ -46,6 +46,7 @@ struct RunOptions {
   bool simulate_only = false;                   ///< no images, meshes, grids, samples or film
   bool skip = true;                             ///< see SimulationOptions::skip
   bool profile = false;
+  bool estimate_errors = true;                  ///< simulate a sample of frames again, more accurately, for RunResult::errors
   bool no_pictures = false;                     ///< no images and no film, which `render_run` makes of the saved states
   implicit::DelaunayMesher delaunay{};          ///< see SimulationOptions::delaunay
   std::string context = "auto";                 ///< auto, osmesa or egl
@@ -97,7 +98,7 @@ struct RunResult {
   std::vector<std::string> warnings;
   SearchCounts searches;    ///< counts of the meshes of all frames, kept ones included
   PictureTimes pictures;
-  StageErrors errors;       ///< of what `run_scene` simulated
+  StageErrors errors;       ///< of what `run_scene` simulated, where RunOptions asks for them
   std::optional<RunOrigin> origin{};  ///< of a variation
 };
 

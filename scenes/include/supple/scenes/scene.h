@@ -379,7 +379,7 @@ struct ContactDesc {
   bool bulge_volume = false;          ///< bulges that hold the displaced volume
   std::optional<double> bulge_width;  ///< over the other body's feature size; absent: 0.15, or as wide as bulge_volume needs
   bool bulge_literal = false;         ///< the term as published
-  std::optional<double> sample_spacing;  ///< [m]; absent: a sixth of what is thinner, the primitive or the obstacles
+  std::optional<double> sample_spacing;  ///< [m]; absent: a sixth (a third where contact.error is 5e-2 or more) of what is thinner, the primitive or the obstacles
 };
 
 /// sleep: bodies at rest are not moved

@@ -206,7 +206,7 @@ RunEstimate estimate_run(const Scene& scene, const RunOptions& options, double f
   }
   const double drawn = options.frames.empty() ? last : static_cast<double>(options.frames.size());
   const double samples = std::max(1, out.calibrated);
-  const double again = sample.touched ? kEstimateWithContact : kEstimateAlone;
+  const double again = !options.estimate_errors ? 0.0 : sample.touched ? kEstimateWithContact : kEstimateAlone;
   out.simulation_s = sample.coarse_s > 0.0 ? (1.0 + again) * coarse_s * sample.cpu_s / sample.coarse_s : 0.0;
   out.drawing_s = sample.first_drawing_s + (drawn - 1.0) * sample.drawing_s / samples;
   out.triangles = out.calibrated > 0 ? sample.triangles / samples : sample.first_triangles;

@@ -11,12 +11,12 @@ namespace {
 
 constexpr int kSmaller = 4;             // edges of pictures
 constexpr int kLeastEdge = 16;          // [pixel]
-constexpr double kCoarserCell = 2.0;
+constexpr double kCoarserCell = 3.0;
 constexpr double kAccuracy = 4e-2;      // steps twice as long as by default
-constexpr double kContactError = 3e-2;  // of force and area
-constexpr double kLeastRate = 12.0;     // frames per second that still show motion
+constexpr double kContactError = 0.1;   // of force and area: meshes and samples of contacts are rough then
+constexpr double kLeastRate = 12.0, kLeastRateOfLong = 8.0;  // frames per second that still show motion
 constexpr int kMostSubsteps = 1 << 20;  // that the keys take
-constexpr int kLeastFrames = 12;        // that the film has then
+constexpr int kLeastFrames = 9, kLeastFramesOfLong = 12;     // that the film has then, beside the first
 
 /// Video formats take even edges only.
 int smaller(int edge) { return std::max(kLeastEdge, edge / kSmaller / 2 * 2); }
@@ -48,6 +48,8 @@ void add_meshing(const Scene& scene, std::vector<std::string>& out) {
 int preview_stride(const Scene& scene) {
   int every = 1;
   while (scene.frame_rate / (2 * every) >= kLeastRate && (scene.frame_count() - 1) / (2 * every) >= kLeastFrames) every *= 2;
+  const int more = every / 2 * 3;
+  if (every > 1 && scene.frame_rate / more >= kLeastRateOfLong && (scene.frame_count() - 1) / more >= kLeastFramesOfLong) every = more;
   return every;
 }
 

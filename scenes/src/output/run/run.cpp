@@ -519,7 +519,8 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
     drawing.overwrite = true;
     std::optional<DrawingCrew> crew;
     std::exception_ptr diverged;
-    StageErrorEstimator errors(scene, simulation_options(options), last_frame);
+    std::optional<StageErrorEstimator> errors;
+    if (options.estimate_errors) errors.emplace(scene, simulation_options(options), last_frame);
     try {
       while (result.frames < last_frame && !stopped()) {
         // The first picture shows what each needs.
@@ -533,11 +534,11 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
         }
         const int next = simulation->frame() + 1;
         crew ? crew->simulating(next) : report("simulate", next, static_cast<double>(next - 1) / last_frame);
-        errors.begin(*simulation);
+        if (errors) errors->begin(*simulation);
         while (simulation->frame() < next && !stopped()) simulation->step();
         if (simulation->frame() < next) break;
         StageProfile& steps = simulation->profile(Stage::Integrate);
-        steps.apart_s += errors.end(*simulation);
+        if (errors) steps.apart_s += errors->end(*simulation);
         steps.scale();
         if (crew) {
           save();
@@ -555,8 +556,10 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
       limit.passed(result) ? crew->leave() : crew->join();
       show_last(*simulation, options, result.frames);
     }
-    result.errors = errors.estimate(simulation->model());
-    add_missed_accuracy(scene, result.errors, result.warnings);
+    if (errors) {
+      result.errors = errors->estimate(simulation->model());
+      add_missed_accuracy(scene, result.errors, result.warnings);
+    }
     if (diverged) std::rethrow_exception(diverged);
     if (stopped()) return;
     finish(writer, *simulation, report, result);
