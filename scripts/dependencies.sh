@@ -15,7 +15,7 @@ declare -A supple_packages=(
   [check]="clang clang-tidy libclang-rt-14-dev"
   [docs]="doxygen python3-venv"
   [deb]="dpkg-dev mmdebstrap"
-  [data]="libcgal-demo"
+  [data]="libcgal-demo mricron-data invesalius-examples"
 )
 declare -A supple_purpose=(
   [build]="to build" [run]="to draw and to encode films" [test]="to build the tests, Delaunay meshes and fits of meshes and volumes" [python]="for the Python package" [fuzz]="for the fuzz targets" [check]="for the second compiler and static analysis" [docs]="for the documentation site" [deb]="to try the Debian package" [data]="data to fit"

@@ -33,6 +33,8 @@ fit kitten kitten.xyz --error 2%
 fit hippo hippo1.ply --error 2%
 fit liver liver.nhdr --error 2% --particles 60 --label 255 --pieces largest
 fit skull skull.nhdr --error 2% --iso 2.9 --pieces largest
+fit ct_skull ct_skull.nhdr --error 2% --label 255 --pieces largest
+fit head ch2.nii.gz --error 4% --iso 30 --pieces largest
 
 # Data on the left, fit on the right.
 inputs=()
