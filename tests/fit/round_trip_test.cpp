@@ -41,7 +41,7 @@ class FittedScene : public ::testing::Test {
 duration: 0.1 s
 frame_rate: 10
 gravity: [0, 0, -9.81]
-ground: {height: 0}
+ground: {height: 0, slope: 300}
 include: supple:materials
 objects:
   - {name: first, include: pebble.yaml, particles: {at: [0, 0, 0.2]}}
@@ -88,7 +88,7 @@ TEST_F(FittedScene, Runs) {
   const scenes::RunResult result = scenes::run_scene(scene(), options);
   EXPECT_EQ(result.outcome, "done");
   EXPECT_EQ(result.frames, 2);
-  EXPECT_TRUE(result.warnings.empty());
+  EXPECT_EQ(result.warnings, std::vector<std::string>{});
 }
 
 TEST_F(FittedScene, IsReportedAsJson) {
