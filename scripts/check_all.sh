@@ -36,8 +36,13 @@ analyse() {
     xargs -P "$supple_jobs" -n 2 clang-tidy --quiet -p "$clang_build"
 }
 
-# All modules and the tool; the tests run each fuzz target for a minute.
-test_sanitizers() { cd "$supple_root" && ctest --preset asan_clang -j "$supple_jobs" --no-tests=error; }
+# Modules scenes and render and the tool; scripts/test.sh has those of core, implicit and collision, and the fuzz targets.
+test_sanitizers() { cd "$supple_root" && ctest --preset sanitized -j "$supple_jobs" --no-tests=error; }
+build_sanitizers() {
+  # Modules without sanitizers are those of the release build.
+  configure_and_build release all -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_CGAL=ON &&
+    for target in fuzz scenes_tests render_tests; do configure_and_build fuzz "$target" || return 1; done
+}
 
 test_tsan() {
   cd "$supple_root" && TSAN_OPTIONS="suppressions=$here/tsan_suppressions.txt ignore_noninstrumented_modules=1 halt_on_error=1" \
@@ -56,8 +61,8 @@ fi
 ! chose analysis || part "static analysis" "$logs/analysis.log" analyse || true
 if ! chose sanitizers; then
   :
-elif part "build (clang's sanitizers)" "$logs/build_asan_clang.log" configure_and_build asan_clang all; then
-  part "tests (clang's sanitizers)" "$logs/tests_asan_clang.log" test_sanitizers || true
+elif part "build (clang's sanitizers)" "$logs/build_sanitizers.log" build_sanitizers; then
+  part "tests (clang's sanitizers)" "$logs/tests_sanitizers.log" test_sanitizers || true
 else
   skip_part "tests (clang's sanitizers)" "no build"
 fi
