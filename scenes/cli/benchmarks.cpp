@@ -21,7 +21,7 @@ struct Group {
   bool names = false;  ///< the program takes the rest of a name that begins with the group
 };
 
-constexpr std::array<Group, 16> kGroups{{
+constexpr std::array<Group, 18> kGroups{{
     {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)", true},
     {"core/integrators", "integrator_bench", "time against error of every integrator; with a file name: plot (SVG)"},
     {"core/stability", "core_stress", "largest stable steps; with a file name: map (SVG)"},
@@ -31,6 +31,8 @@ constexpr std::array<Group, 16> kGroups{{
     {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; arguments: number of poses, case"},
     {"collision/calibration", "contact_calibration", "share of random poses whose true error exceeds the estimate; arguments: number of poses, case, seed"},
     {"collision/invariance", "contact_invariance", "differences between swapped, rotated and scaled queries; arguments: number of poses, case"},
+    {"collision/bodies", "contact_bodies", "contact queries of bodies of many primitives; arguments: number of poses, case"},
+    {"collision/several", "contact_several", "three and four bodies in one place against sums over volumes; arguments: number of groups, seed"},
     {"collision/thin", "contact_thin", "contact queries of bodies that barely overlap; arguments: number of poses, seed"},
     {"collision/rules", "contact_rules", "time against error of the rules of the contact surface; with a file name: plot (SVG)"},
     {"collision/stability", "contact_stress", "stability of contact in extreme scenes; arguments: --seed N, file name of a map (SVG)"},

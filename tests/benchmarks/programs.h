@@ -12,6 +12,7 @@ int contact_invariance(int argc, char** argv);
 int contact_pile(int argc, char** argv);
 int contact_poses(int argc, char** argv);
 int contact_rules(int argc, char** argv);
+int contact_several(int argc, char** argv);
 int contact_stress(int argc, char** argv);
 int contact_thin(int argc, char** argv);
 int core_bench(int argc, char** argv);

@@ -147,6 +147,34 @@ PairSolver::Pressing PairSolver::thirds_press(const Job& job, const PairResult& 
   return std::find(taken_.begin(), taken_.end(), 0) == taken_.end() ? Pressing::All : Pressing::Some;
 }
 
+/// Whether third bodies press harder than both of the pair somewhere beside Sigma, where one of the pair loses space to them and not to the other. Looked for
+/// along the normals of the points of Sigma, as far as the overlap reaches there to first order.
+bool PairSolver::thirds_press_beside(const Job& job, const PairResult& out) {
+  constexpr int kPlaces = 4;  // on either side
+  constexpr std::array<double, 2> kSides{1.0, -1.0};
+  take_all_thirds(job);
+  if (third_bodies_.empty()) return false;
+  PressureBatch& batch = beside_;
+  batch.resize(kSides.size() * kPlaces * out.points.point.size());
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < out.points.point.size(); ++i) {
+    const Vec3 way = (out.summary.largest_overlap * out.points.pressure[i] / out.summary.largest_pressure / kPlaces) * out.points.normal[i];
+    for (const double side : kSides) {
+      for (int k = 1; k <= kPlaces; ++k) batch.point[next++] = out.points.point[i] + side * k * way;
+    }
+  }
+  job.polar.pressure.evaluate_values(batch);
+  value_.resize(batch.size());
+  for (const ContactBody* const third : third_bodies_) {
+    third->field.evaluate(batch.point, value_);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const bool within = batch.a[i] > 0.0 && batch.b[i] > 0.0;
+      if (within && third->material.modulus * value_[i] > std::max(batch.a[i], batch.b[i])) return true;
+    }
+  }
+  return false;
+}
+
 /// Polar patches again, cut where `third_bodies_` press harder. A star tells more of where they do, but is slow where its rays touch a small imprint or a
 /// face has corners: there patches are parted about the imprints themselves, which a star that is not as fine has to confirm.
 /// @return false where neither fits, or they contradict each other
@@ -432,7 +460,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   if (fits && !patches_.empty()) {
     out.summary.rule = ContactRule::Polar;
     const Pressing pressing = third_.empty() ? Pressing::None : thirds_press(job, out);
-    cut_by_thirds_ = false;
+    cut_by_thirds_ = pressing == Pressing::None && !third_.empty() && job.settings().energy && thirds_press_beside(job, out);
     if (pressing == Pressing::All) {
       fill_beyond_thirds(job, out);
       return;

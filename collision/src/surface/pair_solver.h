@@ -61,6 +61,7 @@ class PairSolver {
   /// Of third bodies on the patches of a pair: nowhere near as hard, or harder on some of them, or all over.
   enum class Pressing : std::uint8_t { None, Some, All };
   Pressing thirds_press(const Job& job, const PairResult& out);
+  bool thirds_press_beside(const Job& job, const PairResult& out);
   void find_patches(const Job& job, std::span<const Vec3> seeds);
   bool rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out);
   bool polar(const Job& job, PairResult& out);
@@ -105,7 +106,8 @@ class PairSolver {
   std::vector<double> value_;
   std::vector<Vec3> rim_;
   std::vector<std::uint8_t> taken_;  ///< of points and rims, 1: a third body presses harder
-  bool cut_by_thirds_ = false;       ///< a third body may press harder on a part of Sigma
+  PressureBatch beside_;
+  bool cut_by_thirds_ = false;       ///< a third body may press harder on a part of Sigma, or of what the bodies lose
   PairResult kept_;  ///< what another rule has left
 };
 

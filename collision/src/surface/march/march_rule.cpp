@@ -457,15 +457,25 @@ bool MarchRuleSolver::lay_mesh(PairPressure& pressure, std::span<const ContactBo
   return !coarse;
 }
 
+/// Depth first through halves of the overlap: mostly the first small box says it.
 bool MarchRuleSolver::may_meet(const PairPressure& pressure, const Box& overlap) {
-  constexpr double kLeast = 0.1;
-  const double size = pressure.feature_size();
+  constexpr double kLeast = 0.1;  // of what the softer body presses at most
+  const double smallest = kSmallest * pressure.feature_size();
   const auto most = [&](int side) { return pressure.modulus(side) * pressure.field(side).bound(overlap).upper; };
   const double least = kLeast * std::min(most(0), most(1));
-  for (double cell = size; cell > kSmallest * size; cell *= 0.5) {
-    if (!mesher_.may_meet(pressure, overlap, cell, least)) return false;
+  std::vector<Box> open{overlap};
+  for (std::size_t looked = 0; !open.empty(); ++looked) {
+    const Box box = open.back();
+    open.pop_back();
+    if (!pressure.may_meet(box, least)) continue;
+    Eigen::Index longest = 0;
+    if (box.extent().maxCoeff(&longest) <= smallest || looked == SigmaMesher::kMostCells) return true;
+    Box lower = box, upper = box;
+    lower.upper[longest] = upper.lower[longest] = box.centre()[longest];
+    open.push_back(lower);
+    open.push_back(upper);
   }
-  return true;
+  return false;
 }
 
 bool MarchRuleSolver::solve(const Job& job, PatchPoints& points) {

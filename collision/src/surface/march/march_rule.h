@@ -37,7 +37,7 @@ class MarchRuleSolver {
 
   /// False: bounds of the fields leave no room for Sigma, but for what presses less than a tenth of what the softer body may there: surfaces in one place
   /// have no other one.
-  bool may_meet(const PairPressure& pressure, const Box& overlap);
+  static bool may_meet(const PairPressure& pressure, const Box& overlap);
 
   [[nodiscard]] const PatchSums& sums() const noexcept { return sums_; }
   [[nodiscard]] double estimate() const noexcept { return estimate_; }

@@ -69,7 +69,7 @@ std::uint32_t SigmaMesher::node_of(Key key) const {
 
 /// Cells in which both bodies may press equally, from larger blocks down, and their neighbours: what the images of triangles at
 /// the border leave out then lies where nobody presses.
-bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap, double least) {
+bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap) {
   unsigned level = 0;
   const double reach = (overlap.centre() - origin_).norm() + 0.5 * overlap.extent().norm();
   while (std::ldexp(cell_, static_cast<int>(level)) < reach) {
@@ -89,7 +89,7 @@ bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap, d
       const Vec3 centre = origin_ + axes_ * (side * (low + Vec3::Constant(0.5))), half = axes_.cwiseAbs() * Vec3::Constant(0.5 * side);
       box.lower = centre - half;
       box.upper = centre + half;
-      return !box.overlaps(overlap) || !pressure.may_meet(box, least);
+      return !box.overlaps(overlap) || !pressure.may_meet(box);
     });
     if (level == 0) break;
     if (cells_.size() > kMostCells / 8) return false;
@@ -254,11 +254,6 @@ void SigmaMesher::lay_lattice(const PairPressure& pressure, const Box& overlap, 
   Vec3 near = Vec3::Zero();  // whole cells
   for (Eigen::Index k = mirrored_ ? 2 : 0; k < 3; ++k) near[k] = std::round(to_centre[k] / (cell_ * axes_.col(k).norm()));
   origin_ = origin + axes_ * (cell_ * (near + shift));
-}
-
-bool SigmaMesher::may_meet(const PairPressure& pressure, const Box& overlap, double cell, double least) {
-  lay_lattice(pressure, overlap, cell, std::nullopt, std::nullopt);
-  return !find_cells(pressure, overlap, least) || !cells_.empty();
 }
 
 bool SigmaMesher::mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis,

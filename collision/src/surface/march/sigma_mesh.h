@@ -33,8 +33,6 @@ class SigmaMesher {
   /// @return false where there would be more cells than kMostCells
   bool mesh(PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat,
             SigmaMesh& out);
-  /// Whether bounds in cells leave room for Sigma where both bodies press. @param least  by more than that [Pa]
-  bool may_meet(const PairPressure& pressure, const Box& overlap, double cell, double least);
 
   static constexpr std::size_t kMostCells = 1u << 16;
 
@@ -42,7 +40,7 @@ class SigmaMesher {
   using Key = std::uint64_t;
   void lay_lattice(const PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis,
                    const std::optional<FlatCells>& flat);
-  bool find_cells(const PairPressure& pressure, const Box& overlap, double least = 0.0);
+  bool find_cells(const PairPressure& pressure, const Box& overlap);
   void find_nodes(PairPressure& pressure);
   void cut_cells(SigmaMesh& out);
   void place_vertices(PairPressure& pressure, SigmaMesh& out);

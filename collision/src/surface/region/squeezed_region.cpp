@@ -17,8 +17,9 @@ constexpr double kFewestPlaces = 16.0, kMostPlaces = 512.0, kFewestCells = 4.0, 
 // What is smaller than a cell or than what lies between two places is a small share of the region: over the error, and over its root.
 constexpr double kPlacesOfError = 0.64, kCellsOfError = 0.5;
 constexpr std::size_t kMostLeaves = 4096;
+constexpr double kSafety = 2.0;         // of estimates
 constexpr double kKept = 0.5;           // of the error asked for: what cells that are not quartered may add up to
-constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns
+constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns, off by the square of what the last two values lie apart
 
 }  // namespace
 
@@ -79,7 +80,7 @@ void SqueezedRegion::find_changes(const Lost& lost) {
       }
     }
   }
-  const double enough = kEndsOfError * lost.error * length_;
+  const double enough = std::sqrt(kEndsOfError * lost.error) * length_;
   for (double gap = step; gap > enough; gap *= 0.5) {
     place_.clear();
     for (const Change& e : change_) place_.push_back(from_[e.column] + 0.5 * (e.low + e.high) * along_);
@@ -175,12 +176,18 @@ bool SqueezedRegion::choose(double error) {
   Sums all;
   for (const Cell& cell : leaf_) all.add(cell.sums);
   const auto off = [&](const Cell& cell) { return all.energy > 0.0 ? std::max(cell.off.energy / all.energy, cell.off.volume / all.volume) : 0.0; };
-  double sum = 0.0;
-  for (const Cell& cell : leaf_) sum += off(cell);
-  if (!(sum > error)) return false;
+  // Errors of one sign add up, others cancel: between the two.
+  double sum = 0.0, square = 0.0;
+  const auto grows_beyond = [&](const Cell& cell, double most) {
+    const double e = off(cell);
+    sum += e;
+    square += e * e;
+    return kSafety * std::sqrt(std::sqrt(square) * sum) > most;
+  };
+  if (std::none_of(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return grows_beyond(cell, error); })) return false;
   std::stable_sort(leaf_.begin(), leaf_.end(), [&](const Cell& p, const Cell& q) { return off(p) < off(q); });
-  double kept = 0.0;
-  const auto first = std::find_if(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return (kept += off(cell)) > kKept * error; });
+  sum = square = 0.0;
+  const auto first = std::find_if(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return grows_beyond(cell, kKept * error); });
   split_.assign(first, leaf_.end());
   leaf_.erase(first, leaf_.end());
   return true;
