@@ -78,10 +78,12 @@ inline std::vector<PlaneChart::Place> PlaneChart::waves_of(std::span<const doubl
   constexpr std::size_t kWaves = 6;
   const auto n = static_cast<double>(values.size());
   std::vector<Place> wave(kWaves + 1);
+  std::vector<math::SinCos> turn;
+  for (std::size_t k = 0; k < values.size(); ++k) turn.push_back(math::sin_cos(2.0 * std::numbers::pi * static_cast<double>(k) / n));
   for (std::size_t m = 0; m <= kWaves; ++m) {
     const double share = (m == 0 ? 1.0 : 2.0) / n * (1.0 - static_cast<double>(m) / (kWaves + 1.0));
     for (std::size_t k = 0; k < values.size(); ++k) {
-      const auto [sine, cosine] = math::sin_cos(2.0 * std::numbers::pi * static_cast<double>(m * k % values.size()) / n);
+      const auto [sine, cosine] = turn[m * k % values.size()];
       wave[m][0] += share * values[k] * cosine;
       wave[m][1] += share * values[k] * sine;
     }
