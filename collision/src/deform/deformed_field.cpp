@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "deform/bulge_volume.h"
+#include "numbers.h"
 #include "supple/core/error.h"
 
 namespace supple::collision {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// How far the pressure of a body falls below zero [Pa]: P c where the kernels are compact, infinite else.
 double depth_outside(const ContactBody& body) {
@@ -104,7 +102,7 @@ void follow_gradient(const ContactBody& body, double reach, Buffers& way) {
       const double gone = (way.at[i] - way.start[i]).norm();
       if (gone > reach) continue;
       way.at[i] += (std::clamp(length, -0.5 * reach, 0.5 * reach) / slope) * way.open_slope[k];
-      const double round_off = 4.0 * std::numeric_limits<double>::epsilon() * way.at[i].lpNorm<Eigen::Infinity>();
+      const double round_off = 4.0 * kEpsilon * way.at[i].lpNorm<Eigen::Infinity>();
       if (std::abs(length) > std::max(kEnough * reach, round_off)) {
         way.open[left++] = i;
         continue;
@@ -194,6 +192,27 @@ void add_literal(const ContactBody& body, BulgeProfile h, double highest, std::s
       const double change = h.slope(x) * moved + by_stiffness * (out.steepness[ahead] - out.steepness[behind]);
       out.bulge_slope[i][k] += change / (2.0 * step);
     }
+  }
+}
+
+/// Pressures of a body at points, and their gradients if there is room for them.
+void pressures_of(const ContactBody& body, std::span<const Vec3> points, std::span<double> p, std::span<Vec3> gradients) {
+  if (gradients.empty()) {
+    body.field.evaluate(points, p);
+  } else {
+    body.field.evaluate(points, p, gradients);
+    for (Vec3& g : gradients) g *= body.material.modulus;
+  }
+  for (double& v : p) v *= body.material.modulus;
+}
+
+/// Bulges end where another body begins: they are no higher than its pressure is below zero.
+void lower_limit(const ContactBody& other, std::span<const Vec3> points, Buffers& scratch) {
+  pressures_of(other, points, scratch.value, scratch.slope);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (-scratch.value[i] >= scratch.limit[i]) continue;
+    scratch.limit[i] = -scratch.value[i];
+    if (!scratch.slope.empty()) scratch.limit_slope[i] = -scratch.slope[i];
   }
 }
 
@@ -327,16 +346,7 @@ void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<doubl
                                  std::span<Vec3> gradients) const {
   const bool with_gradients = !gradients.empty();
   const std::size_t n = points.size();
-  const auto pressures = [&](const ContactBody& body, std::span<double> p, std::span<Vec3> g) {
-    if (with_gradients) {
-      body.field.evaluate(points, p, g);
-      for (Vec3& v : g) v *= body.material.modulus;
-    } else {
-      body.field.evaluate(points, p);
-    }
-    for (double& v : p) v *= body.material.modulus;
-  };
-  pressures(bodies_[body_], values, gradients);
+  pressures_of(bodies_[body_], points, values, gradients);
   if (neighbours_.empty() || n == 0) return;
 
   Box box;
@@ -345,7 +355,7 @@ void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<doubl
   scratch->value.resize(n);
   scratch->bulge.assign(n, 0.0);
   scratch->limit.assign(n, together_);
-  scratch->slope.resize(n);
+  scratch->slope.resize(with_gradients ? n : 0);
   if (with_gradients) {
     scratch->bulge_slope.assign(n, Vec3::Zero());
     scratch->limit_slope.assign(n, Vec3::Zero());
@@ -362,7 +372,7 @@ void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<doubl
     const Interval p = other.field.bound(box);
     if (other.material.modulus * p.upper <= -neighbour.profile.width || p.lower >= 0.0) continue;  // no bulge here
     any = true;
-    pressures(other, scratch->value, scratch->slope);
+    pressures_of(other, points, scratch->value, scratch->slope);
     for (std::size_t i = 0; i < n; ++i) {
       const double x = -scratch->value[i];
       scratch->bulge[i] += neighbour.profile.value(x);
@@ -373,12 +383,7 @@ void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<doubl
   for (const std::uint32_t j : limiting_) {
     const ContactBody& other = bodies_[j];
     if (other.material.modulus * other.field.bound(box).upper < -rise_) continue;  // limits nothing
-    pressures(other, scratch->value, scratch->slope);
-    for (std::size_t i = 0; i < n; ++i) {
-      if (-scratch->value[i] >= scratch->limit[i]) continue;
-      scratch->limit[i] = -scratch->value[i];
-      if (with_gradients) scratch->limit_slope[i] = -scratch->slope[i];
-    }
+    lower_limit(other, points, *scratch);
   }
   for (std::size_t i = 0; i < n; ++i) {
     const bool limited = scratch->limit[i] < scratch->bulge[i];

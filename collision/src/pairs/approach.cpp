@@ -3,27 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "response/energy_loads.h"
 #include "supple/core/error.h"
 #include "surface/region/energy_columns.h"
 
 namespace supple::collision {
 namespace {
-
-/// Contributions of a body's parts to its field at one point.
-void contributions_at(const ContactBody& body, const Vec3& x, implicit::FieldParts& row) {
-  if (body.pose.size() == 1) {
-    row.offset.assign({0, 1});
-    row.part.assign(1, 0);
-    row.value.assign(1, 1.0);
-    return;
-  }
-  body.field.evaluate_parts({&x, 1}, row);
-  double sum = 0.0;
-  for (const double v : row.value) sum += v;
-  for (double& v : row.value) v /= sum;
-}
 
 /// One body at a point where it is pushed along a normal.
 struct Handle {
@@ -37,7 +23,7 @@ struct Handle {
     mobility = m;
     point = x;
     normal = n;
-    contributions_at(b, x, row);
+    contributions_at(b, {&point, 1}, row);
   }
   /// Speed of the point along the normal, by contributions, with what impulses have added so far.
   [[nodiscard]] double speed(const PartLoads* added) const {

@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "surface/accuracy.h"
+
 namespace supple::collision {
 
 std::optional<Vec3> PairPressure::tangent(const Vec3& from, const Vec3& normal, const Vec3* apart) const {
@@ -26,7 +28,7 @@ std::optional<Vec3> PairPressure::tangent(const Vec3& from, const Vec3& normal, 
 }
 
 double PairPressure::overlap_out_of(int side, const Vec3& from, const Vec3& way, double longest) {
-  constexpr int kMostSteps = 200, kHalvings = 40;
+  constexpr int kMostSteps = 200;
   constexpr double kEnough = 1e-6;  // of the longest step
   std::array<double, 1> value;
   std::array<Vec3, 1> slope;
@@ -46,7 +48,7 @@ double PairPressure::overlap_out_of(int side, const Vec3& from, const Vec3& way,
   };
   if (!(t > 0.0) || other_presses(t)) return t;
   double low = 0.0;
-  for (int i = 0; i < kHalvings; ++i) {
+  for (int i = 0; i < kBracketSteps; ++i) {
     const double middle = 0.5 * (low + t);
     (other_presses(middle) ? low : t) = middle;
   }

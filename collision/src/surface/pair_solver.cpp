@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 
+#include "numbers.h"
 #include "pairs/body_order.h"
 #include "pairs/boxes.h"
 #include "pairs/cores.h"
@@ -72,7 +72,8 @@ void Partners::build(std::size_t bodies, std::span<const BodyPair> pairs) {
 }
 
 /// Partners of either body whose surfaces may reach the overlap; of teams of obstacles the first ones, and not that of the pair.
-void PairSolver::find_thirds(const Job& job, const BodyPair& pair, const Partners& partners) {
+void PairSolver::find_thirds(const Job& job, const Partners& partners) {
+  const BodyPair& pair = job.pair;
   third_.clear();
   third_bodies_.clear();
   const auto add = [&](std::uint32_t c) {
@@ -199,12 +200,10 @@ bool PairSolver::may_leave_imprints(const Job& job, PairResult& out) {
   const std::optional<double> taken = taken_by_imprints(job, kMost * error, out);
   if (!taken) return false;
   if (out.summary.error_estimate + *taken > error) {
-    PolarJob finer = job.polar;
-    finer.settings.error = error - *taken;
     out.clear();
-    if (!rings(finer, job.overlap, job.convex, out) || out.summary.error_estimate + *taken > error) {
+    if (!rings(job, error - *taken, out) || out.summary.error_estimate + *taken > error) {
       out.clear();
-      rings(job.polar, job.overlap, job.convex, out);
+      rings(job, error, out);
       return false;
     }
     out.summary.rule = ContactRule::Polar;
@@ -237,42 +236,42 @@ void PairSolver::begin_anew(const Job& job, PairResult& out) {
 }
 
 /// Polar patches from where `find_patches` begins. @return false where the rule does not fit
-bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out) {
-  if (!patches_.solve(job, out)) return false;
+bool PairSolver::rings(const Job& job, double error, PairResult& out) {
+  PolarJob polar = job.polar;
+  polar.settings.error = error;
+  PairPressure& pressure = polar.pressure;
+  if (!patches_.solve(polar, out)) return false;
   // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed. Obstacles without samples of their own
   // may be thin, and have a field only near them.
-  const auto shown_by_seeds = [&](int side) { return job.pressure.body(side).skeleton != nullptr || job.pressure.field(side).convex(); };
-  if (!patches_.empty() || (!convex && shown_by_seeds(0) && shown_by_seeds(1))) return true;
+  const auto shown_by_seeds = [&](int side) { return pressure.body(side).skeleton != nullptr || pressure.field(side).convex(); };
+  if (!patches_.empty() || (!job.convex && shown_by_seeds(0) && shown_by_seeds(1))) return true;
   std::optional<Between> between;
-  if (convex) between = between_cores(job.pressure.body(0), job.pressure.body(1), overlap, kManySteps);
+  if (job.convex) between = between_cores(pressure.body(0), pressure.body(1), job.overlap, kManySteps);
   if (between && between->apart) return true;
-  patches_.start_from(overlap, job.pressure);
-  if (!patches_.solve(job, out)) return false;
+  patches_.start_from(job.overlap, pressure);
+  if (!patches_.solve(polar, out)) return false;
   if (!patches_.empty() || !between || !between->overlap) return true;
-  patches_.start_from(between->middle, job.pressure);
-  return patches_.solve(job, out);
+  patches_.start_from(between->middle, pressure);
+  return patches_.solve(polar, out);
 }
 
 /// The same, at another error where the one asked for is not met. @return false where the rule does not fit
 bool PairSolver::polar(const Job& job, PairResult& out) {
   constexpr double kFiner = 0.1, kCoarse = 1e-3;
-  if (!rings(job.polar, job.overlap, job.convex, out)) {
+  const double error = job.settings().error;
+  if (!rings(job, error, out)) {
     // Where rings are lost at a fine error, coarse ones are better than nothing: other rules may not find so thin an overlap.
-    if (!job.convex || job.settings().error >= kCoarse) return false;
+    if (!job.convex || error >= kCoarse) return false;
     out.clear();
-    PolarJob coarse = job.polar;
-    coarse.settings.error = kCoarse;
-    return rings(coarse, job.overlap, job.convex, out);
+    return rings(job, kCoarse, out);
   }
-  if (patches_.empty() || meets(out, job.settings().error)) return true;
+  if (patches_.empty() || meets(out, error)) return true;
   // Rims and rounding may add a little to what panels are held to, and several patches are off by more than each of them: finer ones cost far
   // less than another rule.
   out.clear();
-  PolarJob finer = job.polar;
-  finer.settings.error *= kFiner;
-  if (rings(finer, job.overlap, job.convex, out) && meets(out, job.settings().error)) return true;
+  if (rings(job, kFiner * error, out) && meets(out, error)) return true;
   out.clear();
-  return rings(job.polar, job.overlap, job.convex, out);
+  return rings(job, error, out);
 }
 
 /// Polar patches again, parted about their imprints, and cut where `third_bodies_` press harder. @return false where the rule does not fit
@@ -520,7 +519,7 @@ bool PairSolver::may_lie_within(const Job& job, int side) {
 /// @param equal  both press alike everywhere   @param softer  the side that is known to press less everywhere
 void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> softer, PairResult& out) {
   PairPressure& pressure = job.polar.pressure;
-  if (out.summary.largest_pressure > std::numeric_limits<double>::epsilon() * pressure.largest_modulus()) return;
+  if (out.summary.largest_pressure > kEpsilon * pressure.largest_modulus()) return;
   if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return;
   const int leading = leads(job.a, job.b) ? 0 : 1;
   for (const int side : {leading, 1 - leading}) {
@@ -535,13 +534,13 @@ void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> soft
 }
 
 /// Where patches are looked for first.
-void PairSolver::find_patches(const Job& job, std::span<const Vec3> seeds) {
+void PairSolver::find_patches(const Job& job) {
   if (job.convex) {
-    patches_.start_from(seeds.front(), job.polar.pressure);
-  } else if (seeds.empty()) {
+    patches_.start_from(job.seeds.front(), job.polar.pressure);
+  } else if (job.seeds.empty()) {
     patches_.start_from(job.overlap, job.polar.pressure);
   } else {
-    patches_.start_from(seeds, job.polar.spacing, job.polar.pressure);
+    patches_.start_from(job.seeds, job.polar.spacing, job.polar.pressure);
   }
 }
 
@@ -563,7 +562,7 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
   const double spacing = candidates.spacing.size() == candidates.pair.size() ? candidates.spacing[k] : 0.0;
   const bool convex = !several && candidates.convex.size() == candidates.pair.size() && candidates.convex[k] != 0;
   const double diagonal = overlap.extent().norm();
-  double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : std::numeric_limits<double>::infinity();
+  double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : kInfinity;
   // Boxes that just touch have no extent across, but a patch that is as wide as the samples are apart may be there.
   extent = std::max(extent, convex ? pressure.feature_size() : 2.0 * spacing);
   if (!std::isfinite(extent)) extent = 4.0 * pressure.feature_size();
@@ -571,14 +570,14 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
 
   const Region least = settings.energy ? Region::Sums : Region::None;
   Job job{bodies, boxes, overlap, seeds, pair, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
-  find_thirds(job, pair, partners);
+  find_thirds(job, partners);
   job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
   job.polar.faces = convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite();
   const bool equal = coincide(a, b);
   const std::optional<int> softer = equal ? std::nullopt : softer_of_nested_balls(a, b);
   if (!equal && !softer) {
-    find_patches(job, seeds);
+    find_patches(job);
     choose(job, out);
     fill_unsure_regions(job, out);
   }

@@ -1,3 +1,4 @@
+#include "surface/accuracy.h"
 #include "surface/march/march_rule.h"
 
 #include <algorithm>
@@ -8,12 +9,6 @@
 #include "supple/core/interrupt.h"
 
 namespace supple::collision {
-namespace {
-
-constexpr double kLeastCosine = 0.2;  // between the interpolated normal and that of Sigma
-
-}  // namespace
-
 void MarchRuleSolver::Feet::clear() {
   triangle.clear();
   at.clear();
@@ -59,7 +54,7 @@ void MarchRuleSolver::find_tangents(Feet& feet, std::size_t i) const {
 /// Whether the image lies the same way round there as its triangle, and does not stand on end.
 bool MarchRuleSolver::upright(const Feet& feet, std::size_t i) const {
   const Vec3 normal = feet.batch.slope_b[i] - feet.batch.slope_a[i], way = along(feet.triangle[i], feet.at[i]);
-  return normal.dot(way) > kLeastCosine * normal.norm() * way.norm() && feet.along_s[i].cross(feet.along_t[i]).dot(normal) > 0.0;
+  return normal.dot(way) > kGraphCosine * normal.norm() * way.norm() && feet.along_s[i].cross(feet.along_t[i]).dot(normal) > 0.0;
 }
 
 /// Pressures at some feet, at their heights so far, and the tangents of the image there.

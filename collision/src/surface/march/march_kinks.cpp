@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "numbers.h"
 #include "surface/march/march_rule.h"
 
 namespace supple::collision {
@@ -75,7 +76,7 @@ void MarchRuleSolver::cross_kinks(Leaf& leaf) const {
   // Rates of s along the rays from corner i to j, linear over the leaf, are least at a corner.
   const auto least_rate = [&](std::size_t i, std::size_t j) {
     const std::size_t k = 3 - i - j;
-    double least = std::numeric_limits<double>::infinity();
+    double least = kInfinity;
     for (const Crossing& crossing : kinks) {
       const auto& s = crossing.side;
       const std::array<double, 3> rate{4.0 * s[3 + k] - 3.0 * s[i] - s[j], 3.0 * s[j] + s[i] - 4.0 * s[3 + k],
@@ -131,11 +132,9 @@ void MarchRuleSolver::add_cuts(const Ray& along, double low, double high, std::v
   }
 }
 
-/// Where kinks meet the rim in the leaves [first, end), if the polynomials through their feet say that they do: Newton's method in both
-/// parameters on Sigma.
-void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+/// Fills `corners_` and `feet_` with about where kinks meet the rim in the leaves [first, end), if the polynomials through their feet say that they do.
+void MarchRuleSolver::guess_corners(std::size_t first, std::size_t end) {
   constexpr int kLooks = 9;
-  constexpr double kMet = 1e-5, kFar = 0.02;  // of the piece; off Sigma, in cells
   corners_.clear();
   feet_.clear();
   for (std::size_t l = first; l < end; ++l) {
@@ -172,6 +171,12 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
       }
     }
   }
+}
+
+/// The same on Sigma, by Newton's method in both parameters.
+void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+  constexpr double kMet = 1e-5;  // of the piece
+  guess_corners(first, end);
   feet_.make_room();
   open_.resize(corners_.size());
   std::iota(open_.begin(), open_.end(), std::size_t{0});
@@ -184,7 +189,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
       if (!std::isfinite(move)) continue;
       feet_.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
       if (std::abs(feet_.height[i]) > cell_) continue;
-      if (std::abs(move) > kFar * cell_) {
+      if (std::abs(move) > kFarOff * cell_) {
         open_[left++] = i;
         continue;
       }
@@ -193,8 +198,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
       Vec3 slope;
       const double s = kinks_[corners_[i].kink].value(feet_.batch.point[i], slope);
       const Vec2 rate(slope.dot(feet_.along_s[i]), slope.dot(feet_.along_t[i]));
-      const double whole = cross(here.slope, rate);
-      Vec2 way = Vec2(here.slope.y() * s - rate.y() * here.pressure, rate.x() * here.pressure - here.slope.x() * s) / whole;
+      Vec2 way = meeting_of(here.slope, -here.pressure, rate, -s);
       if (!way.allFinite()) continue;
       const double length = way.norm();
       if (length > size) way *= size / length;

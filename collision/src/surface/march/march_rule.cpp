@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
+#include "numbers.h"
 #include "supple/core/interrupt.h"
+#include "surface/accuracy.h"
 #include "surface/march/flat_cells.h"
 #include "surface/quadrature.h"
 #include "surface/region/squeezed_region.h"
@@ -16,7 +17,6 @@ namespace {
 
 /// Of a cell: a last step as long as this leaves its square, and normals as good as it.
 constexpr double kOnSigma = 1e-9, kOnSigmaAtBest = 1e-12;
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr int kMostHalvings = 4;       // of the cells of a mesh at which something presses
 constexpr int kRoughHalvings = 1;      // the same, where an error of kRough or more is asked for
 constexpr double kRough = 5e-2;
@@ -24,12 +24,9 @@ constexpr double kBeside = 2.0;        // from where it presses, in triangles: o
 constexpr double kBesideEnd = 0.7;     // the same at the end of both supports; not beyond the cells that are there in every view
 constexpr double kSmallest = 1.0 / 512.0;  // cell, over the features, for small patches
 constexpr double kNoLess = 0.9;        // of Sigma: long cells see as much of it as cubes do
-constexpr double kSafety = 2.0;        // of the difference between two rules
-constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
 constexpr double kShortest = 1e-9;     // piece of a ray
 constexpr int kFewNodes = 3;           // through a squeezed region
 constexpr double kWidest = 20.0;       // ends of columns, over where they begin
-constexpr int kMoreAcross = 2;         // columns out of an apex may go through most of the body
 constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
 
 int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
@@ -38,7 +35,6 @@ int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : err
 
 /// Where on the rays the rim lies, or a kink: Newton's method on Sigma, held between places on both sides of it.
 void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Ray>& rays) {
-  constexpr double kFar = 0.02;  // off Sigma, in cells: too far to move along it
   constexpr double kNear = 1e-5;  // near enough to tell on which side of the rim
   constexpr double kMet = 1e-11, kAtZero = 1e-7;
   // The square of this is left of the way to a kink, and sums miss a higher power of it.
@@ -61,7 +57,7 @@ void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const Contact
       feet_.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
       if (std::abs(feet_.height[i]) > cell_) continue;
       open_[left++] = i;
-      if (std::abs(move) > kFar * cell_) continue;
+      if (std::abs(move) > kFarOff * cell_) continue;
       lift(feet_, i, move);
       const Foot here = foot(feet_, i);
       const bool rim = ray.kink == kPressure;
@@ -254,11 +250,11 @@ double MarchRuleSolver::share_of(const Leaf& leaf, int order) {
   constexpr double kFall = 30.0, kKinked = 4.0, kLost = 10.0;
   if (leaf.trust == Trust::Lost) return kLost;
   if (leaf.trust == Trust::Kinked) return kKinked;
-  if (!leaf.shape.certain || !(leaf.sums.load > 0.0) || !(leaf.sums.area > 0.0)) return kSafety;
+  if (!leaf.shape.certain || !(leaf.sums.load > 0.0) || !(leaf.sums.area > 0.0)) return kTwoOrders;
   const double off = std::max(leaf.off.force.norm() / leaf.sums.load, std::abs(leaf.off.area) / leaf.sums.area);
   double root = std::sqrt(off);  // of degree order - 1 at least
   for (int degree = 2; degree < order - 1; degree *= 2) root = std::sqrt(root);
-  return std::min(kSafety, kFall * root);
+  return std::min(kTwoOrders, kFall * root);
 }
 
 /// The sums over all leaves, and what each may be off by, relative to them.
@@ -268,7 +264,7 @@ void MarchRuleSolver::weigh(int order) {
   sums_ = {};
   for (const Leaf& leaf : leaves_) sums_.add(leaf.sums);
   estimate_ = 1.0;
-  unmet_ = std::numeric_limits<double>::infinity();
+  unmet_ = kInfinity;
   if (!(sums_.load > 0.0)) return;
   const double across = std::sqrt(sums_.area), force = force_scale(sums_.force, sums_.load);
   const Vec3 centre = sums_.centre();
@@ -304,7 +300,7 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
     });
     double kept = 0.0;
     std::size_t keeps = 0;
-    while (keeps < order_.size() && kept + leaves_[order_[keeps]].error <= kKept * limits.error) kept += leaves_[order_[keeps++]].error;
+    while (keeps < order_.size() && kept + leaves_[order_[keeps]].error <= kOfKept * limits.error) kept += leaves_[order_[keeps++]].error;
     // All pieces that mirror one another, whose errors differ by round-off, are split, or none.
     constexpr double kAlike = 1.0 - 1e-6;
     while (keeps > 0 && keeps < order_.size() && leaves_[order_[keeps - 1]].error >= kAlike * leaves_[order_[keeps]].error) --keeps;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "numbers.h"
 #include "pairs/body_order.h"
 
 namespace supple::collision {
@@ -33,7 +33,7 @@ Place place_of(Key key) {
 /// Pressure [Pa] of a body outside the support of its field; minus infinity where there is none.
 double outside_support(const PairPressure& pressure, int side) {
   const implicit::FieldView& field = pressure.field(side);
-  if (field.as_field() == nullptr) return -std::numeric_limits<double>::infinity();
+  if (field.as_field() == nullptr) return -kInfinity;
   const Box box = field.surface_box();
   return pressure.modulus(side) * field.value(box.upper + kFar * (box.extent() + Vec3::Constant(field.feature_size())));
 }

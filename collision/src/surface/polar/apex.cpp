@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "numbers.h"
 #include "supple/core/math.h"
 #include "surface/quadrature.h"
 
@@ -90,7 +91,7 @@ void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error,
         for (int k = 0; k < 2 * n; ++k) {
           const math::SinCos turn = math::sin_cos(std::numbers::pi * (k + 0.5) / n);
           way.push_back(Vec3(across * turn.cos, across * turn.sin, z));
-          share.push_back(2.0 * std::numbers::pi / n * height.weight[h] / panels);
+          share.push_back(kTurn / n * height.weight[h] / panels);
         }
       }
     }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "surface/accuracy.h"
+
 namespace supple::collision {
 namespace {
 
@@ -62,14 +64,14 @@ bool PolarPatches::any_touches(PairPressure& pressure, double extent, bool conve
 }
 
 bool PolarPatches::knows_overlap(PairPressure& pressure) {
-  constexpr double kOutside = -1e-9, kInside = 1e-6;  // pressures over moduli; on a body's own samples its own is nothing but rounding
+  constexpr double kInside = 1e-6;  // pressure over the modulus
   batch_.point.clear();
   for (const StartPoint& place : starts_.inside) batch_.point.push_back(place.at);
   batch_.resize(batch_.point.size());
   pressure.evaluate_values(batch_);
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const double a = batch_.a[i] / pressure.modulus(0), b = batch_.b[i] / pressure.modulus(1);
-    if (std::min(a, b) > kOutside && std::max(a, b) > kInside) return true;
+    if (std::min(a, b) > -kOnSurface && std::max(a, b) > kInside) return true;
   }
   return false;
 }

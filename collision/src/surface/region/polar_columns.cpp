@@ -1,9 +1,10 @@
+#include "numbers.h"
+#include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "surface/region/squeezed_region.h"
@@ -11,14 +12,10 @@
 namespace supple::collision {
 namespace {
 
-constexpr double kLeastAlong = 0.1;  // cosine of a way out of the apex to the axis
-constexpr double kLeastSight = 0.1;  // cosine of a body's normal to the ray, at the rim
 constexpr double kWidest = 1.3;      // across over along at the rim: energies by wider columns are off by more than asked
 constexpr double kEndsWithin = 1e-3;  // of the peak: ends beside the rim are that near to the other body's surface
 constexpr double kLong = 1.5;         // over the depth below the peak, to first order
-constexpr int kEndSteps = 40;
 constexpr int kMostOnColumn = 6;
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
@@ -56,7 +53,7 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
   reached_.resize(n);
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  for (int iteration = 0; iteration < kEndSteps; ++iteration) {
+  for (int iteration = 0; iteration < kBracketSteps; ++iteration) {
     for (const std::size_t i : open_) {
       reached_[i] = end[i];
       line_point_[i] = (i + 1 < n ? node_.point[i] : peak_) + end[i] * column(i).way;
@@ -115,7 +112,7 @@ bool PolarRuleSolver::start_out_of(const Apex& apex, double sign) {
   for (std::size_t i = 0; i <= n; ++i) {
     const Vec3 x = i < n ? node_.point[i] : peak_, way = apex.way(x), normal = i < n ? normal_[i] : frame_.axis;
     const double along = sign * way.dot(frame_.axis);
-    if (!(along > kLeastAlong)) return false;
+    if (!(along > kLeastSight)) return false;
     const double flux = sign * normal.dot(way) / (along * normal.dot(frame_.axis)), bend = 1.0 / (along * apex.distance(x));
     column_[i] = {way / along, {flux, 2.0 * bend * flux, bend * bend * flux}};
   }
@@ -178,19 +175,18 @@ bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended)
 
 /// Whether the surface of a body leaves the other one near a place of it: by the place where their normals are the same, which is farthest out.
 bool PolarRuleSolver::comes_out(PairPressure& pressure, int side, Vec3 at) {
-  constexpr int kSteps = 40;
-  constexpr double kOnSurface = 1e-3, kAlike = 1e-3;  // of the feature size; between normals
+  constexpr double kNear = 1e-3, kAlike = 1e-3;  // to the surface, of the feature size; between normals
   const double size = pressure.feature_size(), out = -kEndsWithin * frame_.peak;
   std::array<double, 1> own, other;
   std::array<Vec3, 1> slope, other_slope;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kBracketSteps; ++step) {
     pressure.evaluate(side, {&at, 1}, own, slope);
     pressure.evaluate(1 - side, {&at, 1}, other, other_slope);
     const double steep = slope[0].norm(), other_steep = other_slope[0].norm();
     if (!(steep > 0.0)) return false;
     const Vec3 normal = -slope[0] / steep;
     const double off = own[0] / steep;
-    const bool on_surface = std::abs(off) <= kOnSurface * size;
+    const bool on_surface = std::abs(off) <= kNear * size;
     if (on_surface && other[0] < out) return true;
     if (!(other_steep > 0.0)) return false;
     const Vec3 aim = -other_slope[0] / other_steep, across = aim - aim.dot(normal) * normal;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "supple/core/error.h"
+#include "surface/accuracy.h"
 #include "surface/quadrature.h"
 
 namespace supple::collision {
@@ -17,7 +18,6 @@ constexpr double kFewestPlaces = 16.0, kMostPlaces = 512.0, kFewestCells = 4.0, 
 // What is smaller than a cell or than what lies between two places is a small share of the region: over the error, and over its root.
 constexpr double kPlacesOfError = 0.64, kCellsOfError = 0.5;
 constexpr std::size_t kMostLeaves = 4096;
-constexpr double kKept = 0.5;           // of the error asked for: what cells that are not quartered may add up to
 constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns
 
 }  // namespace
@@ -180,7 +180,7 @@ bool SqueezedRegion::choose(double error) {
   if (!(sum > error)) return false;
   std::stable_sort(leaf_.begin(), leaf_.end(), [&](const Cell& p, const Cell& q) { return off(p) < off(q); });
   double kept = 0.0;
-  const auto first = std::find_if(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return (kept += off(cell)) > kKept * error; });
+  const auto first = std::find_if(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return (kept += off(cell)) > kOfKept * error; });
   split_.assign(first, leaf_.end());
   leaf_.erase(first, leaf_.end());
   return true;
