@@ -114,7 +114,7 @@ void MarchRuleSolver::place(PairPressure& pressure, std::span<const ContactBody*
   feet.make_room();
   open_.resize(feet.size());
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  for (int step = 0; step < kNewtonSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
     measure(pressure, third, feet, open_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {

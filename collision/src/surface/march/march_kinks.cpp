@@ -4,12 +4,12 @@
 #include <numeric>
 
 #include "numbers.h"
+#include "surface/accuracy.h"
 #include "surface/march/march_rule.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kMildError = 1e-4;  // asked for, from which on kinks of the third derivative are left uncut
 constexpr double kReach = 1.1;       // of the feet of a piece, that its image may extend to
 
 }  // namespace
@@ -57,7 +57,7 @@ void MarchRuleSolver::find_crossings(const PairPressure& pressure, std::size_t f
           s[0], s[1], s[2], 2.0 * s[3] - 0.5 * (s[1] + s[2]), 2.0 * s[4] - 0.5 * (s[2] + s[0]), 2.0 * s[5] - 0.5 * (s[0] + s[1])};
       const auto [least, most] = std::minmax_element(control.begin(), control.end());
       if (*least > 0.0 || *most < 0.0) continue;
-      if (kink.order > 2 && error >= kMildError) {
+      if (is_mild(kink, error)) {
         leaf.trust = Trust::Kinked;
         continue;
       }
@@ -180,8 +180,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
   feet_.make_room();
   open_.resize(corners_.size());
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  constexpr int kSteps = 10;
-  for (int step = 0; step < kSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kFreeSteps && !open_.empty(); ++step) {
     measure(pressure, third, feet_, open_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {

@@ -47,7 +47,7 @@ void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const Contact
   for (std::size_t i = 0; i < n; ++i) {
     if (rays[i].rim != Rim::None) open_.push_back(i);
   }
-  for (int step = 0; step < kNewtonSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
     measure(pressure, third, feet_, open_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {
@@ -372,7 +372,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
   const std::size_t n = nodes_.size();
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  for (int step = 0; step < kNewtonSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
     heed_scope();
     place_.clear();
     for (const std::size_t i : open_) place_.push_back(nodes_[i].point + columns_[i].at * columns_[i].way);

@@ -48,7 +48,6 @@ class MarchRuleSolver {
   static constexpr std::size_t kMostPieces = 1u << 15;
 
  private:
-  static constexpr int kNewtonSteps = 30;
   static constexpr double kFarOff = 0.02;  ///< off Sigma, in cells: too far to move along it
   /// A place of a triangle's image.
   struct Foot {

@@ -5,6 +5,7 @@
 
 #include "numbers.h"
 #include "pairs/body_order.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
@@ -197,8 +198,7 @@ void SigmaMesher::place_vertices(PairPressure& pressure, SigmaMesh& out) {
   }
   open_.resize(n);
   for (std::size_t i = 0; i < n; ++i) open_[i] = i;
-  constexpr int kSteps = 30;
-  for (int step = 0; step < kSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
     pressure.evaluate(vertex_, open_, some_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {

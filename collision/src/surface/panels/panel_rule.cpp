@@ -337,10 +337,7 @@ Vec3 PanelSolver::middle_of(const Panel& panel) const {
 }
 
 bool PanelSolver::crosses(const implicit::Kink& kink, const Panel& panel) const {
-  // A kink in a third derivative bends the pressure so little that halving is cheaper down to here.
-  constexpr double kThirdDerivative = 1e-5, kOfStar = 1e-4;
-  const bool star = job_.star != nullptr;
-  if (kink.order > 2 && (star ? job_.error > kOfStar : job_.error >= kThirdDerivative)) return false;
+  if (is_mild(kink, job_.error)) return false;
   // Around the middle, as far as the panel reaches across.
   const Box box = box_of(panel);
   double square = 0.0;

@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kFarOff = 0.2;          // of the radius: crossings from where the heights that are guessed have them
 constexpr int kSamples = 8;              // of the heights along a ray, to find crossings
-constexpr int kBorderSteps = 16;         // of Illinois' method to the border of an imprint
 constexpr double kBorder = 0.01;         // of the way from its middle
 constexpr double kAtOrigin = 1e-9;       // radius of a crossing, over that of the rim: the kink goes through the origin
 
@@ -258,7 +257,7 @@ bool PolarRuleSolver::cross_imprints(PairPressure& pressure, std::size_t ray, st
     Sample left = samples[j], right = samples[j + 1], last = left;
     if ((left.s > 0.0) == (right.s > 0.0)) continue;
     const double from = left.share, to = right.share, within = left.within ? from : to;
-    for (int step = 0; step < kBorderSteps; ++step) {
+    for (int step = 0; step < kBracketSteps; ++step) {
       const double before = last.share;
       last = look(left.share + (right.share - left.share) * left.s / (left.s - right.s), false);
       if (step > 0 && std::abs(last.share - before) <= kBorder * std::abs(last.share - within)) break;

@@ -23,7 +23,7 @@ constexpr double kFirst = 0.05;         // of the radius of the patch
 constexpr double kRough = 0.05, kFine = 1e-4;  // of the distance from the centre of the imprint
 constexpr double kGrowth = 2.0;         // of the distance in a step
 constexpr int kLeaveSteps = 5;
-constexpr int kTouchSteps = 12, kTouchNewton = 3;
+constexpr int kTouchNewton = 3;
 constexpr double kTouch = 1e-6;         // angle between ray and border [rad]: the ray is off by the square
 constexpr double kFarthest = 4.0;       // radii of the patch
 
@@ -255,7 +255,7 @@ std::optional<Vec2> ImprintFinder::touch_between(PairPressure& pressure, const P
   double low = 0.0, high = 1.0, at_low = along(a.spot), at_high = along(b.spot);
   if ((at_low > 0.0) == (at_high > 0.0)) return std::nullopt;
   Spot spot = a.spot;
-  for (int step = 0; step < kTouchSteps; ++step) {
+  for (int step = 0; step < kBracketSteps; ++step) {
     const double share = low + (high - low) * at_low / (at_low - at_high);
     const Vec2 way = direction(frame, (1.0 - share) * a.turns + share * b.turns);
     double r = (1.0 - share) * a.radius + share * b.radius;

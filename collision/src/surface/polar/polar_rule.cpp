@@ -19,7 +19,6 @@ constexpr double kSplitBelow = 5e-3;  // errors for which kinks matter
 constexpr std::size_t kMostCoarse = 3;   // the finest rule for others
 constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
-constexpr int kRimSteps = 30;
 constexpr double kNearRim = 10.0;        // pressure over the peak, by the step over the radius, where Newton's last step to the rim begins: on smooth patches it is 2
 constexpr double kNearRimOfFace = 1.0;   // beside whose edges the slope grows from little to much
 constexpr double kBelowRim = 0.05;       // over the peak
@@ -130,7 +129,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
     const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
     rim_batch_.point[k] = origin + rays.radius[k] * e + rays.height[k] * axis;
   };
-  for (int iteration = 0; iteration < kRimSteps && !open_.empty(); ++iteration) {
+  for (int iteration = 0; iteration < kBracketSteps && !open_.empty(); ++iteration) {
     heed_scope();
     if (again) {
       for (std::size_t k = 0; k < n; ++k) place(k);

@@ -13,6 +13,7 @@
 
 #include "supple/collision/contact_surface.h"
 #include "supple/implicit/kinks.h"
+#include "surface/accuracy.h"
 #include "surface/find_peak.h"
 #include "surface/pair_pressure.h"
 #include "surface/patch_points.h"
@@ -183,12 +184,8 @@ class PolarRuleSolver {
   bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
   bool kinks_cross(PairPressure& pressure);
-  /// Whether a patch is parted at a kink. The fourth power of a rule's points, by which it converges across a jump of a third derivative, is enough to here.
-  [[nodiscard]] bool parts_at(const implicit::Kink& kink) const {
-    constexpr int kThirdDerivative = 3;
-    constexpr double kAcrossIt = 1e-4;  // error
-    return kink.order < kThirdDerivative || error_ < kAcrossIt;
-  }
+  /// Whether a patch is parted at a kink.
+  [[nodiscard]] bool parts_at(const implicit::Kink& kink) const { return !is_mild(kink, error_); }
   [[nodiscard]] double at_rim() const { return kAtRim * error_ * frame_.peak; }
   [[nodiscard]] bool taken_by_thirds();
   bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);

@@ -14,7 +14,7 @@
 namespace supple::collision {
 namespace {
 
-constexpr int kLiftingSteps = 6, kSearchSteps = 64;
+constexpr int kSearchSteps = 64;
 constexpr int kDipRounds = 6;
 constexpr double kDip = 0.1;              // of the pressures beside it
 constexpr double kNear = 0.05;            // of the radius
@@ -176,7 +176,7 @@ void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span
     rays[i].positive = kinks_[rays[i].kink].value(place(rays[i])) > 0.0;
     open.push_back(i);
   }
-  for (int step = 0; step < kLiftingSteps && !open.empty(); ++step) {
+  for (int step = 0; step < kFreeSteps && !open.empty(); ++step) {
     std::erase_if(open, [&](std::size_t i) {
       KinkOnRay& ray = rays[i];
       const Vec3 along = frame_.across(ray.way);
