@@ -6,6 +6,7 @@
 
 #include "deform/bulge_volume.h"
 #include "numbers.h"
+#include "pairs/boxes.h"
 #include "supple/core/error.h"
 
 namespace supple::collision {
@@ -14,7 +15,7 @@ namespace {
 /// How far the pressure of a body falls below zero [Pa]: P c where the kernels are compact, infinite else.
 double depth_outside(const ContactBody& body) {
   const Box box = body.field.surface_box();
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return kInfinity;
+  if (box.empty() || !is_finite(box)) return kInfinity;
   const Vec3 far = box.centre() + Vec3::Constant(100.0 * box.extent().maxCoeff());
   Vec3 slope;
   const double value = body.field.value(far, slope);
@@ -316,7 +317,7 @@ void DeformedPressure::keep_volumes(std::span<const WantedBulge> wanted) {
   rise_ = std::min(rise_, together_);
   bool certain;
   box_ = bounding_box(bodies_[body_], rise_, certain);
-  if (!box_.lower.allFinite() || !box_.upper.allFinite()) {
+  if (!is_finite(box_)) {
     for (const WantedBulge& w : wanted) box_ = box_.intersection(bounding_box(bodies_[w.other], w.width, certain));
   }
   find_limiting();

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "pairs/boxes.h"
 #include "response/energy_loads.h"
 #include "supple/core/error.h"
 #include "surface/region/energy_columns.h"
@@ -258,7 +259,7 @@ double approach_inverse_mass(std::span<const ContactBody> bodies, std::span<cons
 double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, const Vec3& along, int cells) {
   SUPPLE_EXPECTS(cells > 0);
   const Box box = overlap_of(a, b, shift);
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite() || !(box.extent().prod() > 0.0)) return 0.0;
+  if (box.empty() || !is_finite(box) || !(box.extent().prod() > 0.0)) return 0.0;
   const CellSum sum = energy_of_cells(a, b, shift, box, cells);
   const bool certain = says_how_thin(a) && says_how_thin(b);
   if (sum.positive > 0 ? sum.resolved(cells) : certain && is_thicker(a, b, box.extent() / cells)) return sum.energy;
@@ -267,8 +268,8 @@ double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& sh
 }
 
 double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells, double enough) {
-  if (!a.field.surface_box().lower.allFinite() || !a.field.surface_box().upper.allFinite()) {
-    SUPPLE_EXPECTS(b.field.surface_box().extent().allFinite());
+  if (!is_finite(a.field.surface_box())) {
+    SUPPLE_EXPECTS(is_finite(b.field.surface_box()));
     return contact_capacity(b, a, -direction, cells, enough);
   }
   WayThrough way(a, b, direction, std::max(8, cells / 2));

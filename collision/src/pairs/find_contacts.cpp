@@ -29,7 +29,7 @@ struct Columns {
     Vec3 extent = Vec3::Zero();
     double finite = 0.0;
     for (const Box& box : boxes) {
-      if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) continue;
+      if (box.empty() || !is_finite(box)) continue;
       spread.include(box.centre());
       extent += box.extent();
       finite += 1.0;

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "numbers.h"
+#include "pairs/boxes.h"
 #include "surface/accuracy.h"
 
 namespace supple::collision {
@@ -80,7 +81,7 @@ void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, Sta
   out.hill.clear();
   out.inside.clear();
   out.beside.clear();
-  if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite()) return;
+  if (overlap.empty() || !is_finite(overlap)) return;
   constexpr int kNodes = 11;
   constexpr double kStep = 1.0 / (kNodes - 1);
   batch_.resize(kNodes * kNodes * kNodes);
@@ -121,23 +122,17 @@ void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, Sta
   for (std::size_t n = 0; n < order_.size() && n < kMostHills; ++n) out.hill.push_back(start_at(order_[n]));
 }
 
-/// Newton's method along the gradient of p_A - p_B.
-Vec3 PeakFinder::foot_on_sigma(PairPressure& pressure, Vec3 x, double reach) {
+Vec3 PeakFinder::foot_on_sigma(PairPressure& pressure, const Vec3& x, double reach) {
   constexpr int kSteps = 4;
   batch_.resize(1);
+  batch_.point[0] = x;
   for (int step = 0; step < kSteps; ++step) {
-    batch_.point[0] = x;
     pressure.evaluate(batch_);
-    const Vec3 slope = batch_.slope_a[0] - batch_.slope_b[0];
-    const double square = slope.squaredNorm();
-    if (!(square > 0.0)) break;
-    Vec3 move = ((batch_.b[0] - batch_.a[0]) / square) * slope;
-    const double length = move.norm();
-    if (length > reach) move *= reach / length;
-    x += move;
+    step_to_sigma(batch_, reach);
   }
+  const Vec3 foot = batch_.point[0];
   batch_.resize(5);
-  return x;
+  return foot;
 }
 
 /// The axis from the slopes at a place, for the first step. @return a direction across it; nothing where the slopes are the same

@@ -99,7 +99,7 @@ class PeakFinder {
   void look_around(PairPressure& pressure, const Vec3& x, const Vec3& u, const Vec3& v, double h);
   [[nodiscard]] Bends bends_of(int side, const Vec3& u, const Vec3& v, double h) const;
   static void set_frame(PairPressure& pressure, const Tangents& at, const Bends& curvature, const Bends& gap, double flattest, PeakFrame& frame);
-  Vec3 foot_on_sigma(PairPressure& pressure, Vec3 x, double reach);
+  Vec3 foot_on_sigma(PairPressure& pressure, const Vec3& x, double reach);
   /// Point n of `batch_`, once that is evaluated.
   [[nodiscard]] StartPoint start_at(std::size_t n) const { return {batch_.point[n], batch_.slope_b[n] - batch_.slope_a[n]}; }
 

@@ -48,6 +48,9 @@ struct AlongAxis {
   [[nodiscard]] double rise(const Vec3& way) const { return (slope_a - slope_b).dot(way) / rate; }
 };
 
+/// One step of Newton's method towards p_A = p_B along its gradient, no longer than `longest` [m], from each place of a batch that has been evaluated.
+void step_to_sigma(PressureBatch& batch, double longest);
+
 class PairPressure {
  public:
   PairPressure(const ContactBody& a, const ContactBody& b)
@@ -106,6 +109,16 @@ class PairPressure {
     field_[side].evaluate(points, values);
     for (double& v : values) v *= modulus_[side];
     evaluations_ += points.size();
+  }
+  [[nodiscard]] double value(int side, const Vec3& x) {
+    double p;
+    evaluate(side, {&x, 1}, {&p, 1});
+    return p;
+  }
+  [[nodiscard]] double value(int side, const Vec3& x, Vec3& slope) {
+    double p;
+    evaluate(side, {&x, 1}, {&p, 1}, {&slope, 1});
+    return p;
   }
 
   /// Whether the box may hold a place where both bodies press, and equally hard, by their bounds. @param least  by more than that [Pa]

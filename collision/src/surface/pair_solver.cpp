@@ -1,7 +1,6 @@
 #include "surface/pair_solver.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -365,7 +364,7 @@ struct PanelRule {
 };
 
 bool PairSolver::panels(const Job& job, PairResult& out) {
-  if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return false;
+  if (!is_finite(job.overlap)) return false;
   PairPressure& pressure = job.polar.pressure;
   std::vector<Vec3> starts(job.seeds.begin(), job.seeds.end());
   if (starts.empty()) {
@@ -423,7 +422,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   }
   bool fits = (any || only == ContactRule::Polar) && polar(job, out);
   // Bodies that overlap where rings find no Sigma lie in each other, or one is so thin that Sigma is far from where rings begin.
-  const bool may_be_missed = any && patches_.empty() && out.rounding <= kLostInRounding && job.overlap.lower.allFinite() && job.overlap.upper.allFinite() &&
+  const bool may_be_missed = any && patches_.empty() && out.rounding <= kLostInRounding && is_finite(job.overlap) &&
                              (patches_.knows_overlap(job.polar.pressure) || may_lie_within(job, 0) || may_lie_within(job, 1)) &&
                              march_.may_meet(job.polar.pressure, job.overlap);
   fits = fits && !may_be_missed;
@@ -498,11 +497,9 @@ void PairSolver::fill_beyond_thirds(const Job& job, PairResult& out) {
 bool PairSolver::may_lie_within(const Job& job, int side) {
   const ContactBody& inner = side == 0 ? job.a : job.b;
   const auto presses_less = [&](const Vec3& place) -> std::optional<bool> {  // none: it has no pressure there
-    std::array<double, 2> at{};
-    job.polar.pressure.evaluate(side, {&place, 1}, {at.data(), 1});
-    if (!(at[0] > 0.0)) return std::nullopt;
-    job.polar.pressure.evaluate(1 - side, {&place, 1}, {&at[1], 1});
-    return at[0] < at[1];
+    const double own = job.polar.pressure.value(side, place);
+    if (!(own > 0.0)) return std::nullopt;
+    return own < job.polar.pressure.value(1 - side, place);
   };
   if (inner.skeleton == nullptr) return presses_less(inner.field.surface_box().centre()).value_or(false);
   for (const implicit::Primitive& p : inner.skeleton->primitive) {
@@ -520,7 +517,7 @@ bool PairSolver::may_lie_within(const Job& job, int side) {
 void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> softer, PairResult& out) {
   PairPressure& pressure = job.polar.pressure;
   if (out.summary.largest_pressure > kEpsilon * pressure.largest_modulus()) return;
-  if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return;
+  if (!is_finite(job.overlap)) return;
   const int leading = leads(job.a, job.b) ? 0 : 1;
   for (const int side : {leading, 1 - leading}) {
     if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None || !(equal || (softer ? *softer == side : may_lie_within(job, side)))) continue;
@@ -573,7 +570,7 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
   find_thirds(job, partners);
   job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
-  job.polar.faces = convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite();
+  job.polar.faces = convex && !job.polar.axis && is_finite(overlap);
   const bool equal = coincide(a, b);
   const std::optional<int> softer = equal ? std::nullopt : softer_of_nested_balls(a, b);
   if (!equal && !softer) {

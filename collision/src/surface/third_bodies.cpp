@@ -5,6 +5,7 @@
 
 #include "numbers.h"
 #include "pairs/body_order.h"
+#include "pairs/boxes.h"
 
 namespace supple::collision {
 namespace {
@@ -31,7 +32,7 @@ Comparison compare(const ContactBody& one, const ContactBody& other, const impli
   found.alike = found.step = kInfinity;
   const Box box = met.surface_box(), box_one = one.field.surface_box(), box_other = other.field.surface_box();
   const Box common{box.lower.cwiseMax(box_one.lower).cwiseMax(box_other.lower), box.upper.cwiseMin(box_one.upper).cwiseMin(box_other.upper)};
-  if (common.empty() || !common.lower.allFinite() || !common.upper.allFinite()) return found;
+  if (common.empty() || !is_finite(common)) return found;
   const double steepest = std::max(one.material.modulus * one.field.gradient_bound(common), other.material.modulus * other.field.gradient_bound(common));
   const double size = std::min({met.feature_size(), one.field.feature_size(), other.field.feature_size()});
   const double farthest = common.lower.cwiseAbs().cwiseMax(common.upper.cwiseAbs()).maxCoeff();

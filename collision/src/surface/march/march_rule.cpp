@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "numbers.h"
+#include "pairs/boxes.h"
 #include "supple/core/interrupt.h"
 #include "surface/accuracy.h"
 #include "surface/march/flat_cells.h"
@@ -472,7 +473,7 @@ bool MarchRuleSolver::solve(const Job& job, PatchPoints& points) {
   estimate_ = 1.0;
   thickness_ = 0.0;
   points.clear();
-  if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite() || !(overlap.extent().maxCoeff() > 0.0)) return false;
+  if (overlap.empty() || !is_finite(overlap) || !(overlap.extent().maxCoeff() > 0.0)) return false;
   const double coordinates = std::max(overlap.lower.cwiseAbs().maxCoeff(), overlap.upper.cwiseAbs().maxCoeff());
   kinks_.clear();
   all_kinks_ = pressure.kinks(overlap, kinks_);

@@ -100,15 +100,7 @@ class PanelSolver {
 void PanelSolver::move_to_sigma(PressureBatch& batch) const {
   constexpr int kSteps = 3;
   for (int step = 0; step < kSteps; ++step) {
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      const Vec3 slope = batch.slope_a[i] - batch.slope_b[i];
-      const double square = slope.squaredNorm();
-      if (!(square > 0.0)) continue;
-      Vec3 move = ((batch.b[i] - batch.a[i]) / square) * slope;
-      const double length = move.norm();
-      if (length > setting_.view.reach) move *= setting_.view.reach / length;
-      batch.point[i] += move;
-    }
+    step_to_sigma(batch, setting_.view.reach);
     job_.pressure.evaluate(batch);
   }
 }

@@ -1,11 +1,11 @@
 #include "surface/polar/apex.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "numbers.h"
+#include "pairs/boxes.h"
 #include "supple/core/math.h"
 #include "surface/quadrature.h"
 
@@ -29,15 +29,13 @@ void find_ends(PairPressure& pressure, int side, const Vec3& apex, std::span<con
 /// Sigma is to the apex.
 Apex apex_across(PairPressure& pressure, int side, const Vec3& from, const Vec3& outward, double longest) {
   constexpr int kPlaces = 64;
-  std::array<double, 1> own, other;
   const auto reach = [&](const Vec3& way, bool kept) {
     double far = 0.0;
     for (int k = 1; k <= kPlaces; ++k) {
       const double t = longest * k / kPlaces;
       const Vec3 x = from + t * way;
-      pressure.evaluate(side, {&x, 1}, own);
-      pressure.evaluate(1 - side, {&x, 1}, other);
-      if (!(own[0] > 0.0) || (kept && other[0] >= own[0])) break;
+      const double own = pressure.value(side, x);
+      if (!(own > 0.0) || (kept && pressure.value(1 - side, x) >= own)) break;
       far = t;
     }
     return far;
@@ -52,23 +50,21 @@ std::optional<Apex> find_apex(PairPressure& pressure, int side, std::span<const 
   const implicit::FieldView& field = pressure.field(side);
   if (!field.convex()) return std::nullopt;
   const Box box = field.surface_box();
-  std::array<double, 1> own, other;
-  if (!box.lower.allFinite() || !box.upper.allFinite()) {
+  if (!is_finite(box)) {
     const std::optional<implicit::CorePoint> core = field.core_point(from);
     if (!core || !core->round) return std::nullopt;  // a half-space
-    std::array<Vec3, 1> slope;
-    pressure.evaluate(side, {&from, 1}, own, slope);
-    return Apex{.at = -slope[0].normalized(), .parallel = true};
+    Vec3 slope;
+    static_cast<void>(pressure.value(side, from, slope));
+    return Apex{.at = -slope.normalized(), .parallel = true};
   }
   if (thirds.empty()) return apex_across(pressure, side, from, outward, box.extent().norm());
   const std::optional<implicit::CorePoint> core = field.core_point(box.centre());
   Apex apex{.at = core ? core->point : box.centre()};
-  pressure.evaluate(side, {&apex.at, 1}, own);
-  pressure.evaluate(1 - side, {&apex.at, 1}, other);
-  if (!(own[0] > 0.0)) return std::nullopt;
+  const double own = pressure.value(side, apex.at);
+  if (!(own > 0.0)) return std::nullopt;
   double third = 0.0;
   for (const ContactBody* body : thirds) third = std::max(third, body->material.modulus * body->field.value(apex.at));
-  apex.lost = other[0] > std::max(own[0], third);
+  apex.lost = pressure.value(1 - side, apex.at) > std::max(own, third);
   return apex;
 }
 

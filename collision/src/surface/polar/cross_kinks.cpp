@@ -73,9 +73,7 @@ double PolarRuleSolver::side_of(std::size_t kink, PairPressure& pressure, const 
   if (kink < kinks_.size()) return kinks_[kink].value(x);
   const ContactBody& body = *third_[kink - kinks_.size()];
   const double share = frame_.depth[0] / frame_.thickness;
-  double a, b;
-  pressure.evaluate(0, {&x, 1}, {&a, 1});
-  pressure.evaluate(1, {&x, 1}, {&b, 1});
+  const double a = pressure.value(0, x), b = pressure.value(1, x);
   return body.material.modulus * body.field.value(x) - (share * a + (1.0 - share) * b);
 }
 

@@ -3,7 +3,6 @@
 #include "surface/polar/polar_rule.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -177,19 +176,17 @@ bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended)
 bool PolarRuleSolver::comes_out(PairPressure& pressure, int side, Vec3 at) {
   constexpr double kNear = 1e-3, kAlike = 1e-3;  // to the surface, of the feature size; between normals
   const double size = pressure.feature_size(), out = -kEndsWithin * frame_.peak;
-  std::array<double, 1> own, other;
-  std::array<Vec3, 1> slope, other_slope;
   for (int step = 0; step < kBracketSteps; ++step) {
-    pressure.evaluate(side, {&at, 1}, own, slope);
-    pressure.evaluate(1 - side, {&at, 1}, other, other_slope);
-    const double steep = slope[0].norm(), other_steep = other_slope[0].norm();
+    Vec3 slope, other_slope;
+    const double own = pressure.value(side, at, slope), other = pressure.value(1 - side, at, other_slope);
+    const double steep = slope.norm(), other_steep = other_slope.norm();
     if (!(steep > 0.0)) return false;
-    const Vec3 normal = -slope[0] / steep;
-    const double off = own[0] / steep;
+    const Vec3 normal = -slope / steep;
+    const double off = own / steep;
     const bool on_surface = std::abs(off) <= kNear * size;
-    if (on_surface && other[0] < out) return true;
+    if (on_surface && other < out) return true;
     if (!(other_steep > 0.0)) return false;
-    const Vec3 aim = -other_slope[0] / other_steep, across = aim - aim.dot(normal) * normal;
+    const Vec3 aim = -other_slope / other_steep, across = aim - aim.dot(normal) * normal;
     if (on_surface && across.norm() < kAlike) return false;
     at += std::clamp(off, -size, size) * normal + size * across;
   }

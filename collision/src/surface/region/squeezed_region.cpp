@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "pairs/boxes.h"
 #include "supple/core/error.h"
 #include "surface/accuracy.h"
 #include "surface/quadrature.h"
@@ -187,7 +188,7 @@ bool SqueezedRegion::choose(double error) {
 }
 
 void SqueezedRegion::fill(const Lost& lost, const Box& overlap, const Vec3& across, PatchPoints& points) {
-  SUPPLE_EXPECTS(overlap.lower.allFinite() && overlap.upper.allFinite());
+  SUPPLE_EXPECTS(is_finite(overlap));
   Eigen::Index axis = 0;
   across.cwiseAbs().maxCoeff(&axis);
   along_ = Vec3::Unit(axis);
