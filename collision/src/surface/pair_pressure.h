@@ -32,6 +32,9 @@ struct PressureBatch {
   }
 };
 
+/// Third bodies, which take what they press harder on.
+using Thirds = std::span<const ContactBody* const>;
+
 /// What both pressures at a place, and their slopes, tell to first order of Sigma along an axis through it. The slopes are only looked at.
 struct AlongAxis {
   const Vec3 &slope_a, &slope_b;  // [Pa/m]

@@ -219,12 +219,12 @@ void PairSolver::take_all_thirds(const Job& job) {
   }
 }
 
-/// Third bodies as what bounds panels. @param taken  of them
-void PairSolver::take_third_levels(const Job& job, std::span<const ContactBody* const> taken) {
+/// `third_bodies_` as what bounds panels.
+void PairSolver::take_third_levels(const Job& job) {
   third_levels_.clear();
   for (std::size_t t = 0; t < third_.size(); ++t) {
     const ContactBody* const third = &thirds_.all()[t];
-    if (std::find(taken.begin(), taken.end(), third) != taken.end()) third_levels_.push_back({third, third_[t] > job.pair.b});
+    if (std::find(third_bodies_.begin(), third_bodies_.end(), third) != third_bodies_.end()) third_levels_.push_back({third, third_[t] > job.pair.b});
   }
 }
 
@@ -291,7 +291,7 @@ bool PairSolver::stars_cut(const Job& job, double asked, PairResult& out) {
   out.clear();
   PairPressure& pressure = job.polar.pressure;
   share_.clear();
-  take_third_levels(job, third_bodies_);
+  take_third_levels(job);
   const std::span<const PolarCover> covers = patches_.covers();
   const double error = covers.size() > 1 ? kFiner * asked : asked;
   for (const PolarCover& cover : covers) {
@@ -373,7 +373,7 @@ bool PairSolver::panels(const Job& job, PairResult& out) {
   }
   PanelRule rule;
   return solve_in_order(job, rule, ContactRule::Panels, [&](const Regions& regions, const Vec3& reference) {
-    take_third_levels(job, third_bodies_);
+    take_third_levels(job);
     const bool fits = solve_by_panels({pressure, third_levels_, job.overlap, starts, job.settings().error, regions, reference, job.settings().energy, job.settings().only == ContactRule::None}, panel_room_, out.points, rule.outcome);
     for (const std::size_t side : {0u, 1u}) out.points.unsure[side] = out.points.unsure[side] || rule.outcome.thirds;
     return fits;

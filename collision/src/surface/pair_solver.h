@@ -75,7 +75,7 @@ class PairSolver {
   [[nodiscard]] bool suits_panels(const Job& job) const;
   void choose(const Job& job, PairResult& out);
   void take_all_thirds(const Job& job);
-  void take_third_levels(const Job& job, std::span<const ContactBody* const> taken);
+  void take_third_levels(const Job& job);
   void begin_anew(const Job& job, PairResult& out);
   static double region_error(const ContactSettings& settings);
   void fill_unsure_regions(const Job& job, PairResult& out);

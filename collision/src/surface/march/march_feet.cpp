@@ -58,8 +58,7 @@ bool MarchRuleSolver::upright(const Feet& feet, std::size_t i) const {
 }
 
 /// Pressures at some feet, at their heights so far, and the tangents of the image there.
-void MarchRuleSolver::measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet,
-                              std::span<const std::size_t> which) {
+void MarchRuleSolver::measure(PairPressure& pressure, Thirds third, Feet& feet, std::span<const std::size_t> which) {
   heed_scope();  // a pair may take seconds
   for (const std::size_t i : which) feet.batch.point[i] = plane(feet.triangle[i], feet.at[i]) + feet.height[i] * along(feet.triangle[i], feet.at[i]);
   pressure.evaluate(feet.batch, which, some_);
@@ -110,7 +109,7 @@ void MarchRuleSolver::lift(Feet& feet, std::size_t i, double move) const {
 }
 
 /// Feet on Sigma by Newton's method in their heights.
-void MarchRuleSolver::place(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet) {
+void MarchRuleSolver::place(PairPressure& pressure, Thirds third, Feet& feet) {
   feet.make_room();
   open_.resize(feet.size());
   std::iota(open_.begin(), open_.end(), std::size_t{0});

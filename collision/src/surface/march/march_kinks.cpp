@@ -174,7 +174,7 @@ void MarchRuleSolver::guess_corners(std::size_t first, std::size_t end) {
 }
 
 /// The same on Sigma, by Newton's method in both parameters.
-void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+void MarchRuleSolver::find_corners(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end) {
   constexpr double kMet = 1e-5;  // of the piece
   guess_corners(first, end);
   feet_.make_room();
@@ -211,7 +211,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
 }
 
 /// Where the leaves [first, end) are parted across the rays: where the rim, and kinks, meet the edges that rays begin and end on.
-void MarchRuleSolver::find_breaks(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+void MarchRuleSolver::find_breaks(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end) {
   find_ends(pressure, third, first, end);
   cuts_.clear();
   for (std::size_t l = first; l < end; ++l) {
@@ -257,7 +257,7 @@ void MarchRuleSolver::find_breaks(PairPressure& pressure, std::span<const Contac
 }
 
 /// Where kinks cut the parts of the rays that press.
-void MarchRuleSolver::find_cuts(PairPressure& pressure, std::span<const ContactBody* const> third) {
+void MarchRuleSolver::find_cuts(PairPressure& pressure, Thirds third) {
   cuts_.clear();
   for (Ray& ray : rays_) {
     ray.first_cut = cuts_.size();

@@ -109,7 +109,7 @@ MarchRuleSolver::Shape MarchRuleSolver::shape_of(const Piece& piece) const {
 }
 
 /// The triangles of the mesh as pieces. Vertices and middles of edges have the same image seen from every triangle, and are placed once.
-void MarchRuleSolver::begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces) {
+void MarchRuleSolver::begin(PairPressure& pressure, Thirds third, std::vector<Piece>& pieces) {
   constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   const std::array<Vec2, 6> at{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1), Vec2(0.5, 0.5), Vec2(0, 0.5), Vec2(0.5, 0)};
   const auto edge_of = [](const SigmaMesh::Triangle& triangle, std::size_t across) {
@@ -181,7 +181,7 @@ std::optional<double> MarchRuleSolver::turn(const Piece& piece, std::size_t acro
 }
 
 /// Fills `turns_`: places of the edges of pieces where the pressure turns and has another sign than at both ends. @param any  else none is looked for
-void MarchRuleSolver::find_turns(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool any) {
+void MarchRuleSolver::find_turns(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool any) {
   turns_.assign(from.size(), {});
   feet_.clear();
   for (std::size_t p = 0; any && p < from.size(); ++p) {
@@ -238,8 +238,7 @@ void MarchRuleSolver::divide(const Piece& p, const std::array<std::optional<Foot
 
 /// Ends of edges of pieces become corners of smaller ones: four of each, or where `at_turns` and the pressure turns on edges, so that both rims of a narrow
 /// band cross it, as many as have a corner on its ridge and one rim each.
-void MarchRuleSolver::split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool at_turns,
-                            std::vector<Piece>& to) {
+void MarchRuleSolver::split(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to) {
   find_turns(pressure, third, from, at_turns);
   feet_.clear();
   const std::size_t first = to.size();
@@ -284,7 +283,7 @@ bool MarchRuleSolver::smooth(const Piece& piece) const {
 }
 
 /// Takes out pieces that certainly do not press, and splits those whose rim is in doubt until they are small; appends leaves.
-void MarchRuleSolver::settle(PairPressure& pressure, std::span<const ContactBody* const> third, double error, std::vector<Piece>& pieces) {
+void MarchRuleSolver::settle(PairPressure& pressure, Thirds third, double error, std::vector<Piece>& pieces) {
   double held = 0.0;  // area that presses, about
   for (const Leaf& leaf : leaves_) held += leaf.sums.area;
   const auto add = [&](const Piece& piece, const Shape& shape, double area) {

@@ -35,7 +35,7 @@ int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : err
 }  // namespace
 
 /// Where on the rays the rim lies, or a kink: Newton's method on Sigma, held between places on both sides of it.
-void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Ray>& rays) {
+void MarchRuleSolver::find_zeros(PairPressure& pressure, Thirds third, std::vector<Ray>& rays) {
   constexpr double kNear = 1e-5;  // near enough to tell on which side of the rim
   constexpr double kMet = 1e-11, kAtZero = 1e-7;
   // The square of this is left of the way to a kink, and sums miss a higher power of it.
@@ -87,7 +87,7 @@ void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const Contact
 }
 
 /// Where the rim crosses the first edge of each leaf, from the lone corner to the next but one.
-void MarchRuleSolver::find_ends(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+void MarchRuleSolver::find_ends(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end) {
   rays_.clear();
   for (std::size_t l = first; l < end; ++l) {
     Leaf& leaf = leaves_[l];
@@ -205,8 +205,7 @@ MarchRuleSolver::Node MarchRuleSolver::node_at(std::size_t i) const {
 }
 
 /// Sums of the leaves from `first` on by rules of this order and of one less.
-void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, double error,
-                                std::size_t first) {
+void MarchRuleSolver::integrate(PairPressure& pressure, Thirds third, const Vec3& reference, double error, std::size_t first) {
   const int order = order_for(error);
   for (; first < leaves_.size(); first += kBatch) {
     const std::size_t end = std::min(leaves_.size(), first + kBatch);
@@ -286,7 +285,7 @@ void MarchRuleSolver::weigh(int order) {
 }
 
 /// Splits the leaves that err most until the rest is as good as asked. @return whether Sigma was met
-bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference) {
+bool MarchRuleSolver::refine(PairPressure& pressure, Thirds third, const Limits& limits, const Vec3& reference) {
   const int order = order_for(limits.error);
   leaves_.clear();
   nodes_.clear();
@@ -324,7 +323,7 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
 
 /// Ways through what one body loses: out of its apex, or along the interpolated normals, which fill the space beside Sigma without gaps as far as
 /// they do not meet.
-void MarchRuleSolver::start_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, const Node& peak) {
+void MarchRuleSolver::start_columns(PairPressure& pressure, int side, Thirds third, const Node& peak) {
   const double sign = side == 0 ? 1.0 : -1.0;
   apex_ = find_apex(pressure, side, third, peak.point, sign * peak.normal);
   columns_.assign(nodes_.size(), {});
@@ -367,8 +366,7 @@ bool MarchRuleSolver::hold(PairPressure& pressure, int side) {
 }
 
 /// Gauss points in what one body loses, unless columns do not hold it.
-void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, double error, const Node& peak,
-                                  PatchPoints& points) {
+void MarchRuleSolver::add_columns(PairPressure& pressure, int side, Thirds third, double error, const Node& peak, PatchPoints& points) {
   start_columns(pressure, side, third, peak);
   const std::size_t n = nodes_.size();
   open_.resize(n);
@@ -412,7 +410,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
 }
 
 /// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press. @return whether there were not too many cells
-bool MarchRuleSolver::lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
+bool MarchRuleSolver::lay_mesh(PairPressure& pressure, Thirds third, const Box& overlap,
                                const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat, int most_halvings) {
   const auto mesh = [&] {
     heed_scope();
@@ -467,7 +465,7 @@ bool MarchRuleSolver::may_meet(const PairPressure& pressure, const Box& overlap)
 
 bool MarchRuleSolver::solve(const Job& job, PatchPoints& points) {
   PairPressure& pressure = job.pressure;
-  const std::span<const ContactBody* const> third = job.third;
+  const Thirds third = job.third;
   const Box& overlap = job.overlap;
   const Limits& limits = job.limits;
   estimate_ = 1.0;

@@ -26,7 +26,7 @@ class MarchRuleSolver {
   };
   struct Job {
     PairPressure& pressure;
-    std::span<const ContactBody* const> third;  ///< bodies whose larger pressure takes space away from the pair
+    Thirds third;  ///< bodies whose larger pressure takes space away from the pair
     Box overlap;
     Regions regions;  ///< what is wanted of the squeezed regions
     Vec3 reference;   ///< origin of the moments in `sums`
@@ -154,8 +154,8 @@ class MarchRuleSolver {
 
   void find_tangents(Feet& feet, std::size_t i) const;
   [[nodiscard]] bool upright(const Feet& feet, std::size_t i) const;
-  void measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet, std::span<const std::size_t> which);
-  void place(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet);
+  void measure(PairPressure& pressure, Thirds third, Feet& feet, std::span<const std::size_t> which);
+  void place(PairPressure& pressure, Thirds third, Feet& feet);
   [[nodiscard]] double to_sigma(const Feet& feet, std::size_t i) const;
   void lift(Feet& feet, std::size_t i, double move) const;
   [[nodiscard]] Vec3 plane(std::uint32_t triangle, const Vec2& at) const;
@@ -184,14 +184,14 @@ class MarchRuleSolver {
   [[nodiscard]] Shape shape_of(const Piece& piece) const;
   [[nodiscard]] bool smooth(const Piece& piece) const;
   [[nodiscard]] bool may_press(const PairPressure& pressure, const Piece& piece) const;
-  bool lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const std::optional<CommonAxis>& axis,
+  bool lay_mesh(PairPressure& pressure, Thirds third, const Box& overlap, const std::optional<CommonAxis>& axis,
                 const std::optional<FlatCells>& flat, int most_halvings);
-  void begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces);
+  void begin(PairPressure& pressure, Thirds third, std::vector<Piece>& pieces);
   static std::optional<double> turn(const Piece& piece, std::size_t across);
-  void find_turns(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool any);
+  void find_turns(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool any);
   void divide(const Piece& p, const std::array<std::optional<Foot>, 3>& turned, std::vector<std::array<Foot, 3>>& to) const;
-  void split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to);
-  void settle(PairPressure& pressure, std::span<const ContactBody* const> third, double error, std::vector<Piece>& pieces);
+  void split(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to);
+  void settle(PairPressure& pressure, Thirds third, double error, std::vector<Piece>& pieces);
   void guess(Ray& ray) const;
   static double height_at(const Piece& piece, const Vec2& at);
   static std::array<double, 6> weights(const Piece& piece, const Vec2& at);
@@ -199,23 +199,23 @@ class MarchRuleSolver {
   void find_crossings(const PairPressure& pressure, std::size_t first, std::size_t end, double error);
   void add_cuts(const Ray& along, double low, double high, std::vector<Ray>& cuts) const;
   void guess_corners(std::size_t first, std::size_t end);
-  void find_corners(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
-  void find_breaks(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
-  void find_cuts(PairPressure& pressure, std::span<const ContactBody* const> third);
+  void find_corners(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end);
+  void find_breaks(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end);
+  void find_cuts(PairPressure& pressure, Thirds third);
   bool sides_agree(const Leaf& leaf, std::size_t first_ray, std::size_t end_ray, std::size_t foot);
-  void find_ends(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
+  void find_ends(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end);
   void send_rays(std::size_t first, std::size_t end, int order);
-  void find_zeros(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Ray>& rays);
+  void find_zeros(PairPressure& pressure, Thirds third, std::vector<Ray>& rays);
   void lay_points();
   [[nodiscard]] Node node_at(std::size_t i) const;
-  void integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, double error, std::size_t first);
+  void integrate(PairPressure& pressure, Thirds third, const Vec3& reference, double error, std::size_t first);
   static double share_of(const Leaf& leaf, int order);
   void weigh(int order);
-  bool refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference);
-  void start_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, const Node& peak);
+  bool refine(PairPressure& pressure, Thirds third, const Limits& limits, const Vec3& reference);
+  void start_columns(PairPressure& pressure, int side, Thirds third, const Node& peak);
   [[nodiscard]] bool lead_out() const;
   bool hold(PairPressure& pressure, int side);
-  void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, double error, const Node& peak, PatchPoints& points);
+  void add_columns(PairPressure& pressure, int side, Thirds third, double error, const Node& peak, PatchPoints& points);
 
   SigmaMesher mesher_;
   SigmaMesh mesh_;

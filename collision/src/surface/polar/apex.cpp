@@ -46,7 +46,7 @@ Apex apex_across(PairPressure& pressure, int side, const Vec3& from, const Vec3&
 
 }  // namespace
 
-std::optional<Apex> find_apex(PairPressure& pressure, int side, std::span<const ContactBody* const> thirds, const Vec3& from, const Vec3& outward) {
+std::optional<Apex> find_apex(PairPressure& pressure, int side, Thirds thirds, const Vec3& from, const Vec3& outward) {
   const implicit::FieldView& field = pressure.field(side);
   if (!field.convex()) return std::nullopt;
   const Box box = field.surface_box();

@@ -27,7 +27,7 @@ struct Apex {
 /// @param thirds  that take space from the pair, too: then the apex is the middle of the body, for all its pairs
 /// @param from  a place of Sigma   @param outward  its normal out of the body
 /// @return none of bodies that are not known to be convex
-[[nodiscard]] std::optional<Apex> find_apex(PairPressure& pressure, int side, std::span<const ContactBody* const> thirds, const Vec3& from, const Vec3& outward);
+[[nodiscard]] std::optional<Apex> find_apex(PairPressure& pressure, int side, Thirds thirds, const Vec3& from, const Vec3& outward);
 
 /// Gauss points more along a column where it may go through most of the body.
 inline constexpr int kMoreAcross = 2;

@@ -334,7 +334,7 @@ double PolarRuleSolver::algebraic_error() const { return 2.0 * rim_error_ + plac
 
 bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const Known& known, PatchPoints& points) {
   PairPressure& pressure = job.pressure;
-  const std::span<const ContactBody* const> third = job.third;
+  const Thirds third = job.third;
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   extent_ = 2.0 * job.extent;
   error_ = job.settings.error;

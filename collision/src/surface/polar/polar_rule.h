@@ -403,7 +403,7 @@ class PolarRuleSolver {
   bool may_go_through_ = false;  // one body through the other: not balls and half-spaces, whose surfaces meet in one circle, and not where third bodies press
 
   double error_ = 0.0;                 // asked for
-  std::span<const ContactBody* const> third_;
+  Thirds third_;
   bool cut_ = false;                   // nodes where a third body presses harder do not count
   std::vector<double> third_value_;    // pressures of third bodies at points, one body after the other
   std::vector<Vec3> third_slope_;
