@@ -8,6 +8,7 @@
 #include "numbers.h"
 #include "pairs/boxes.h"
 #include "supple/core/error.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
@@ -128,8 +129,7 @@ double width_within(const ContactBody& body, const Vec3& place, double width) {
   const auto ends_at = [&](double x) { return body.field.value(place + (inside + x) * out) < lowest; };
   double low = 0.0, high = width;
   if (!ends_at(high)) return width;
-  constexpr int kHalvings = 30;
-  for (int k = 0; k < kHalvings; ++k) (ends_at(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
+  for (int k = 0; k < kBracketSteps; ++k) (ends_at(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
   return low;
 }
 

@@ -5,6 +5,7 @@
 
 #include "response/energy_loads.h"
 #include "supple/core/error.h"
+#include "surface/kept_results.h"
 
 namespace supple::collision {
 namespace {
@@ -398,9 +399,9 @@ ReactionReport react(const ReactionInputs& in, const Executor& executor, const R
   all.begin(bodies, surface.summary);
   all.count_contacts(bodies.size(), in);
   // In the portions of stage 6, so that threads find the points that they made.
-  constexpr std::size_t kPortion = 512, kPairs = 4, kBodies = 32;
+  constexpr std::size_t kBodies = 32;
   for (std::size_t portion = 0; portion < pairs; portion += kPortion) {
-    executor.for_blocks(std::min(kPortion, pairs - portion), kPairs, [&, portion](std::size_t begin, std::size_t end) {
+    executor.for_blocks(std::min(kPortion, pairs - portion), kPairsTogether, [&, portion](std::size_t begin, std::size_t end) {
       const std::size_t first = portion + begin, last = portion + end;
       const auto first_of = [first](const std::vector<std::uint32_t>& pair) {
         return static_cast<std::size_t>(std::lower_bound(pair.begin(), pair.end(), first) - pair.begin());

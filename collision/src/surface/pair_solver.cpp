@@ -18,6 +18,9 @@ namespace {
 /// their sums, but do not mix. Errors finer than this are met where all pairs tell the former.
 constexpr double kAllFlow = 1e-7;
 
+/// Error below which panels may miss slivers of that size between their nodes.
+constexpr double kFinestPanels = 1e-4;
+
 /// Whether a body is convex and certainly does not reach a box: cheaper than bounds of its field.
 bool clear_of(const ContactBody& body, const Box& box) {
   const std::optional<implicit::CorePoint> core = body.field.core_point(box.centre());
@@ -152,14 +155,14 @@ PairSolver::Pressing PairSolver::thirds_press(const Job& job, const PairResult& 
 /// @return false where neither fits, or they contradict each other
 bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   if (job.a.pose.size() > 1 || job.b.pose.size() > 1) return false;  // their squeezed regions are not cut that exactly
-  constexpr double kFinestStar = 1e-4, kSafety = 3.0;
+  constexpr double kSafety = 3.0;
   constexpr double kSmall = 0.05;  // of the area of the patches: a star tells imprints that take less from each other by few of its rays
   const double whole = out.summary.area;
   const std::span<const PolarCover> covers = patches_.covers();
   const bool faces = std::any_of(covers.begin(), covers.end(), [](const PolarCover& cover) { return cover.frame.flat; });
   if (faces) return imprints_cut(job, out);
   const double error = job.settings().error;
-  const bool star = stars_cut(job, std::max(error, kFinestStar), out), coarse = error >= kFinestStar;
+  const bool star = stars_cut(job, std::max(error, kFinestPanels), out), coarse = error >= kFinestPanels;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
   const bool unsure = out.points.unsure[0] || out.points.unsure[1];  // of what a body loses that is not known to be convex
   if (star && coarse && !small && !unsure && (out.points.point.empty() || meets(out, error))) return true;
@@ -392,9 +395,8 @@ bool PairSolver::march_instead(const Job& job, PairResult& out) {
 /// Whether polar patches would be many, or crossed by many kinks, so that panels cost less.
 bool PairSolver::suits_panels(const Job& job) const {
   constexpr std::size_t kFewHills = 3, kManyPrimitives = 16;
-  constexpr double kWide = 2.0;     // overlaps, in features of the bodies
-  constexpr double kFinest = 1e-4;  // error: below, panels may miss slivers of that size between their nodes
-  if (job.settings().error < kFinest) return false;
+  constexpr double kWide = 2.0;  // overlaps, in features of the bodies
+  if (job.settings().error < kFinestPanels) return false;
   const auto many = [](const ContactBody& body) { return body.skeleton != nullptr && body.skeleton->primitive.size() >= kManyPrimitives; };
   if (!many(job.a) && !many(job.b)) return false;
   return patches_.hills() > kFewHills || job.polar.extent > kWide * job.polar.pressure.feature_size();

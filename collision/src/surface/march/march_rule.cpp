@@ -333,10 +333,10 @@ void MarchRuleSolver::start_columns(PairPressure& pressure, int side, Thirds thi
     if (apex_) {
       c.way = apex_->way(node.point);
       const double flux = sign * node.weight * node.normal.dot(c.way), bend = 1.0 / apex_->distance(node.point);
-      c.swept = {flux, 2.0 * bend * flux, bend * bend * flux};
+      c.swept = swept_out_of_apex(flux, bend);
     } else {
       c.way = sign * node.along;
-      c.swept = {node.swept[0], sign * node.swept[1], node.swept[2]};
+      c.swept = {{node.swept[0], sign * node.swept[1], node.swept[2]}};
     }
   }
 }
@@ -356,7 +356,7 @@ bool MarchRuleSolver::hold(PairPressure& pressure, int side) {
   place_.clear();
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const Column& c = columns_[i];
-    if (!(std::abs(c.width(c.at)) < kWidest * std::abs(c.width(0.0)))) return false;
+    if (!(std::abs(c.swept.width(c.at)) < kWidest * std::abs(c.swept.width(0.0)))) return false;
     place_.push_back(nodes_[i].point + c.at * c.way);
   }
   if (apex_) return true;
@@ -402,7 +402,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, Thirds third
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       const double t = c.at * gauss.node[j];
       points.volume_point.push_back(nodes_[i].point + t * c.way);
-      points.volume_weight.push_back(c.width(t) * c.at * gauss.weight[j]);
+      points.volume_weight.push_back(c.swept.width(t) * c.at * gauss.weight[j]);
     }
   }
   if (apex_ && apex_->lost) fill_body(pressure, side, apex_->at, error, points.volume_point, points.volume_weight);

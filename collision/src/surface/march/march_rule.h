@@ -118,9 +118,8 @@ class MarchRuleSolver {
   /// How far a squeezed region reaches along a node's way, between places on both sides of its end, and the area across it over that distance.
   struct Column {
     Vec3 way = Vec3::Zero();
-    std::array<double, 3> swept{};  // a polynomial
+    Swept swept{};
     double at = 0.0, low = 0.0, high = kInfinity;
-    [[nodiscard]] double width(double t) const { return swept[0] + t * (swept[1] + t * swept[2]); }
   };
   /// A kink that may cross a leaf, by its s at the corners and at the middles of the edges.
   struct Crossing {

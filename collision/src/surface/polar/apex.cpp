@@ -7,6 +7,7 @@
 #include "numbers.h"
 #include "pairs/boxes.h"
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 #include "surface/quadrature.h"
 
 namespace supple::collision {
@@ -14,10 +15,9 @@ namespace {
 
 /// Distances along rays out of the apex to where the body ends; its pressure is positive at the apex and falls through 0 once on each.
 void find_ends(PairPressure& pressure, int side, const Vec3& apex, std::span<const Vec3> way, double longest, std::vector<double>& end) {
-  constexpr int kHalvings = 52;
   std::vector<double> low(way.size(), 0.0), high(way.size(), longest), value(way.size());
   std::vector<Vec3> point(way.size());
-  for (int step = 0; step < kHalvings; ++step) {
+  for (int step = 0; step < kBracketSteps; ++step) {
     for (std::size_t i = 0; i < way.size(); ++i) point[i] = apex + 0.5 * (low[i] + high[i]) * way[i];
     pressure.evaluate(side, point, value);
     for (std::size_t i = 0; i < way.size(); ++i) (value[i] > 0.0 ? low[i] : high[i]) = 0.5 * (low[i] + high[i]);

@@ -2,6 +2,7 @@
 /// Columns through the space that a convex body loses to others, from one place of it.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -23,6 +24,16 @@ struct Apex {
   [[nodiscard]] Vec3 way(const Vec3& x) const { return parallel ? at : Vec3((x - at).normalized()); }
   [[nodiscard]] double distance(const Vec3& x) const { return parallel ? kInfinity : (x - at).norm(); }
 };
+
+/// Area across a column over the distance along it: a polynomial, whose factors are what the two curvatures of Sigma make of a step.
+struct Swept {
+  std::array<double, 3> of{};
+  [[nodiscard]] double width(double t) const { return of[0] + t * (of[1] + t * of[2]); }
+  [[nodiscard]] double widens(double t) const { return of[1] + 2.0 * t * of[2]; }
+  [[nodiscard]] double volume(double t) const { return t * (of[0] + t * (0.5 * of[1] + t * of[2] / 3.0)); }
+};
+/// The same of a column out of an apex. @param flux  width where it leaves Sigma   @param bend  over the distance from the apex [1/m]
+[[nodiscard]] inline Swept swept_out_of_apex(double flux, double bend) { return {{flux, 2.0 * bend * flux, bend * bend * flux}}; }
 
 /// @param thirds  that take space from the pair, too: then the apex is the middle of the body, for all its pairs
 /// @param from  a place of Sigma   @param outward  its normal out of the body

@@ -363,11 +363,8 @@ class PolarRuleSolver {
   /// A line from a node through a squeezed region. Where columns spread, X = node + t way, across from the axis by 1 + t spread times as far as the
   /// node, and t has the area of the node's foot times (1 + t spread)(narrow + t spread).
   struct Column {
-    Vec3 way;                       // of length 1 along the axis
-    std::array<double, 3> swept{};  // area across it over the distance along it, a polynomial; over that across the axis
-    [[nodiscard]] double width(double t) const { return swept[0] + t * (swept[1] + t * swept[2]); }
-    [[nodiscard]] double widens(double t) const { return swept[1] + 2.0 * t * swept[2]; }
-    [[nodiscard]] double volume(double t) const { return t * (swept[0] + t * (0.5 * swept[1] + t * swept[2] / 3.0)); }
+    Vec3 way;       // of length 1 along the axis
+    Swept swept{};  // over the area across the axis
   };
 
   PeakFrame frame_;

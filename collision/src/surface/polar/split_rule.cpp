@@ -16,14 +16,13 @@ namespace supple::collision {
 namespace {
 
 constexpr double kWidest = 2.2;          // panel at the beginning [rad]
-constexpr double kWidestCoarse = 2.4;
+constexpr double kWidestCoarse = 2.4;    // the same by the coarser rule of angles
 constexpr double kWidestOfStar = 0.8;    // where no kink parts the patch: its outline is uneven
 constexpr int kMostRadial = 16;
 constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr std::size_t kMostPanels = 48, kMostBesideThirds = 192;  // that the estimate may ask for
-constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
 constexpr double kSliversBelow = 1e-6;   // errors at which those between a corner of the rim and the first ray after it matter
 constexpr double kLeastAlong = 0.5;      // cosine between the rim and the line to its next point
 constexpr double kMostChange = 2.0;      // of the radius, over what its slopes say
@@ -63,11 +62,11 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 /// 46,000 panels of a disc on a box, boxes, capsules, plates and blobs.
 constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
 constexpr double kRound = 6e5;  // times its square
-constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
-constexpr double kUnknown = 4.0;  // of either difference, where kinks are not all known
+constexpr double kLeast = 0.01, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
+constexpr double kSlow = 4.0;  // of either difference, where rules converge slowly: rays may touch a third body anywhere on a face, or kinks are not all known
 constexpr double kRegularOnFaces = 2.0;  // times the root of the difference, of the panel itself
 constexpr double kDecayOnFaces = 2.0;    // of panels whose rays meet other kinks from some angle on
-constexpr double kOnFaces = 0.05, kOnFacesUneven = 0.1, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
+constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
 constexpr double kRadial = 2.0, kRadialOnFacesFew = 0.15, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
 constexpr std::size_t kFine = 15;  // rays
@@ -288,15 +287,15 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
   panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
   if (about_middle_ && cut_) {
-    const double share = kBesideThirds * (panel.halved ? kHalf : 1.0);
+    const double share = kSlow * (panel.halved ? kHalf : 1.0);
     panel.by_angle *= share;
     panel.by_radius *= share;
     return;
   }
   if (!all_kinks_) {
     // Some may cross any panel, where rules converge slowly.
-    panel.by_angle = std::max(kUnknown * panel.by_angle, slow_decay(panel, all));
-    panel.by_radius *= kUnknown;
+    panel.by_angle = std::max(kSlow * panel.by_angle, slow_decay(panel, all));
+    panel.by_radius *= kSlow;
     return;
   }
   // Over the panel itself: what differs so much is not the last digit of a rule that converges.
@@ -309,12 +308,12 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   if (!panel.even()) {
     const auto changes = static_cast<double>(panel.change_end - panel.change);
     const double decay = about_middle_ ? std::min(kDecayOnFaces * slow_decay(panel, all), kHalf * panel.by_angle) : 0.0;
-    panel.by_angle *= panel.lost ? kLost : about_middle_ ? std::max(on_faces, kOnFacesUneven) : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
+    panel.by_angle *= panel.lost ? kLost : about_middle_ ? std::max(on_faces, kOnFacesHalved) : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
     panel.by_angle = std::max(panel.by_angle, decay);
   } else {
     const double root = std::sqrt(panel.by_angle);
     if (fine) {
-      panel.by_angle *= std::clamp(kRegular * root, cut_ ? kLeastHalved : kLeastFine, 1.0);
+      panel.by_angle *= std::clamp(kRegular * root, cut_ ? kLeastHalved : kLeast, 1.0);
     } else {
       // Rays nearly touch kinks that are round.
       const bool flat = std::all_of(sheets_.begin(), sheets_.end(), [](const Sheet& sheet) { return sheet.flat; });

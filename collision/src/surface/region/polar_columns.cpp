@@ -91,7 +91,7 @@ bool PolarRuleSolver::start_columns(int side) {
   const std::size_t n = node_.size();
   const double sign = side == 0 ? 1.0 : -1.0, spread = spread_[side];
   if (apex_[side] && start_out_of(*apex_[side], sign)) return true;
-  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, {1.0, 0.0, 0.0}});
+  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, {{1.0, 0.0, 0.0}}});
   if (spread == 0.0) return true;
   for (std::size_t i = 0; i <= n; ++i) {
     const Vec3 d = (i < n ? node_.point[i] : peak_) - frame_.origin, across = d - d.dot(frame_.axis) * frame_.axis;
@@ -99,7 +99,7 @@ bool PolarRuleSolver::start_columns(int side) {
     along.way += spread * across;
     const double narrow = i < n ? 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis) : 1.0;
     if (!(narrow > 0.0)) return false;
-    along.swept = {narrow, spread * (1.0 + narrow), spread * spread};
+    along.swept = {{narrow, spread * (1.0 + narrow), spread * spread}};
   }
   return true;
 }
@@ -113,7 +113,7 @@ bool PolarRuleSolver::start_out_of(const Apex& apex, double sign) {
     const double along = sign * way.dot(frame_.axis);
     if (!(along > kLeastSight)) return false;
     const double flux = sign * normal.dot(way) / (along * normal.dot(frame_.axis)), bend = 1.0 / (along * apex.distance(x));
-    column_[i] = {way / along, {flux, 2.0 * bend * flux, bend * bend * flux}};
+    column_[i] = {way / along, swept_out_of_apex(flux, bend)};
   }
   return true;
 }
@@ -230,12 +230,12 @@ void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, in
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3& begins = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
     const Column& along = column(i);
-    points.displaced[side] += weight_[i] * along.volume(end_[side][i]);
+    points.displaced[side] += weight_[i] * along.swept.volume(end_[side][i]);
     const double length = reached_[i], last = line_value_[i], slope = line_slope_[i].dot(along.way);
     const double rest = -0.5 * last * last / slope;  // to where the pressure vanishes
-    const double width = along.width(0.0), width_there = along.width(length);
-    const double first_slope = begins.dot(along.way) * width + pressure_[i] * along.widens(0.0);
-    const double last_slope = slope * width_there + last * along.widens(length);
+    const double width = along.swept.width(0.0), width_there = along.swept.width(length);
+    const double first_slope = begins.dot(along.way) * width + pressure_[i] * along.swept.widens(0.0);
+    const double last_slope = slope * width_there + last * along.swept.widens(length);
     const double sum = rule.end * (pressure_[i] * width + last * width_there) + rule.slope * length * (first_slope - last_slope);
     points.energy[side] += weight_[i] * (length * sum + rest * width_there);
   }
@@ -248,7 +248,7 @@ void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, in
   pressure.evaluate(side, line_point_, line_value_);
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < between; ++j) {
-      const double width = column(i).width(reached_[i] * rule.node[j]);
+      const double width = column(i).swept.width(reached_[i] * rule.node[j]);
       points.energy[side] += weight_[i] * reached_[i] * rule.weight[j] * width * line_value_[i * between + j];
     }
   }
@@ -263,7 +263,7 @@ void PolarRuleSolver::add_points(PairPressure& pressure, int nodes, int side, Pa
     const double length = end_[side][i];
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       points.volume_point.push_back(node_.point[i] + (length * gauss.node[j]) * column(i).way);
-      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j] * column(i).width(length * gauss.node[j]));
+      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j] * column(i).swept.width(length * gauss.node[j]));
     }
   }
   add_to_region(pressure, side, begin, line_value_, points);
