@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+
+#include "numbers.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTolerance = 1e-3;       // of a volume
 constexpr int kFinest = 8;                // halvings of the first spacing of lines
 constexpr std::size_t kMostLines = 1'000'000;

@@ -2,21 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "deform/bulge_volume.h"
+#include "numbers.h"
+#include "pairs/boxes.h"
 #include "supple/core/error.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// How far the pressure of a body falls below zero [Pa]: P c where the kernels are compact, infinite else.
 double depth_outside(const ContactBody& body) {
   const Box box = body.field.surface_box();
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) return kInfinity;
+  if (box.empty() || !is_finite(box)) return kInfinity;
   const Vec3 far = box.centre() + Vec3::Constant(100.0 * box.extent().maxCoeff());
   Vec3 slope;
   const double value = body.field.value(far, slope);
@@ -104,7 +104,7 @@ void follow_gradient(const ContactBody& body, double reach, Buffers& way) {
       const double gone = (way.at[i] - way.start[i]).norm();
       if (gone > reach) continue;
       way.at[i] += (std::clamp(length, -0.5 * reach, 0.5 * reach) / slope) * way.open_slope[k];
-      const double round_off = 4.0 * std::numeric_limits<double>::epsilon() * way.at[i].lpNorm<Eigen::Infinity>();
+      const double round_off = 4.0 * kEpsilon * way.at[i].lpNorm<Eigen::Infinity>();
       if (std::abs(length) > std::max(kEnough * reach, round_off)) {
         way.open[left++] = i;
         continue;
@@ -129,8 +129,7 @@ double width_within(const ContactBody& body, const Vec3& place, double width) {
   const auto ends_at = [&](double x) { return body.field.value(place + (inside + x) * out) < lowest; };
   double low = 0.0, high = width;
   if (!ends_at(high)) return width;
-  constexpr int kHalvings = 30;
-  for (int k = 0; k < kHalvings; ++k) (ends_at(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
+  for (int k = 0; k < kBracketSteps; ++k) (ends_at(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
   return low;
 }
 
@@ -194,6 +193,27 @@ void add_literal(const ContactBody& body, BulgeProfile h, double highest, std::s
       const double change = h.slope(x) * moved + by_stiffness * (out.steepness[ahead] - out.steepness[behind]);
       out.bulge_slope[i][k] += change / (2.0 * step);
     }
+  }
+}
+
+/// Pressures of a body at points, and their gradients if there is room for them.
+void pressures_of(const ContactBody& body, std::span<const Vec3> points, std::span<double> p, std::span<Vec3> gradients) {
+  if (gradients.empty()) {
+    body.field.evaluate(points, p);
+  } else {
+    body.field.evaluate(points, p, gradients);
+    for (Vec3& g : gradients) g *= body.material.modulus;
+  }
+  for (double& v : p) v *= body.material.modulus;
+}
+
+/// Bulges end where another body begins: they are no higher than its pressure is below zero.
+void lower_limit(const ContactBody& other, std::span<const Vec3> points, Buffers& scratch) {
+  pressures_of(other, points, scratch.value, scratch.slope);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (-scratch.value[i] >= scratch.limit[i]) continue;
+    scratch.limit[i] = -scratch.value[i];
+    if (!scratch.slope.empty()) scratch.limit_slope[i] = -scratch.slope[i];
   }
 }
 
@@ -297,7 +317,7 @@ void DeformedPressure::keep_volumes(std::span<const WantedBulge> wanted) {
   rise_ = std::min(rise_, together_);
   bool certain;
   box_ = bounding_box(bodies_[body_], rise_, certain);
-  if (!box_.lower.allFinite() || !box_.upper.allFinite()) {
+  if (!is_finite(box_)) {
     for (const WantedBulge& w : wanted) box_ = box_.intersection(bounding_box(bodies_[w.other], w.width, certain));
   }
   find_limiting();
@@ -327,16 +347,7 @@ void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<doubl
                                  std::span<Vec3> gradients) const {
   const bool with_gradients = !gradients.empty();
   const std::size_t n = points.size();
-  const auto pressures = [&](const ContactBody& body, std::span<double> p, std::span<Vec3> g) {
-    if (with_gradients) {
-      body.field.evaluate(points, p, g);
-      for (Vec3& v : g) v *= body.material.modulus;
-    } else {
-      body.field.evaluate(points, p);
-    }
-    for (double& v : p) v *= body.material.modulus;
-  };
-  pressures(bodies_[body_], values, gradients);
+  pressures_of(bodies_[body_], points, values, gradients);
   if (neighbours_.empty() || n == 0) return;
 
   Box box;
@@ -345,7 +356,7 @@ void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<doubl
   scratch->value.resize(n);
   scratch->bulge.assign(n, 0.0);
   scratch->limit.assign(n, together_);
-  scratch->slope.resize(n);
+  scratch->slope.resize(with_gradients ? n : 0);
   if (with_gradients) {
     scratch->bulge_slope.assign(n, Vec3::Zero());
     scratch->limit_slope.assign(n, Vec3::Zero());
@@ -362,7 +373,7 @@ void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<doubl
     const Interval p = other.field.bound(box);
     if (other.material.modulus * p.upper <= -neighbour.profile.width || p.lower >= 0.0) continue;  // no bulge here
     any = true;
-    pressures(other, scratch->value, scratch->slope);
+    pressures_of(other, points, scratch->value, scratch->slope);
     for (std::size_t i = 0; i < n; ++i) {
       const double x = -scratch->value[i];
       scratch->bulge[i] += neighbour.profile.value(x);
@@ -373,12 +384,7 @@ void DeformedPressure::evaluate_at(std::span<const Vec3> points, std::span<doubl
   for (const std::uint32_t j : limiting_) {
     const ContactBody& other = bodies_[j];
     if (other.material.modulus * other.field.bound(box).upper < -rise_) continue;  // limits nothing
-    pressures(other, scratch->value, scratch->slope);
-    for (std::size_t i = 0; i < n; ++i) {
-      if (-scratch->value[i] >= scratch->limit[i]) continue;
-      scratch->limit[i] = -scratch->value[i];
-      if (with_gradients) scratch->limit_slope[i] = -scratch->slope[i];
-    }
+    lower_limit(other, points, *scratch);
   }
   for (std::size_t i = 0; i < n; ++i) {
     const bool limited = scratch->limit[i] < scratch->bulge[i];

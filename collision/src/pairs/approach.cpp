@@ -3,27 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "pairs/boxes.h"
+#include "response/energy_loads.h"
 #include "supple/core/error.h"
 #include "surface/region/energy_columns.h"
 
 namespace supple::collision {
 namespace {
-
-/// Contributions of a body's parts to its field at one point.
-void contributions_at(const ContactBody& body, const Vec3& x, implicit::FieldParts& row) {
-  if (body.pose.size() == 1) {
-    row.offset.assign({0, 1});
-    row.part.assign(1, 0);
-    row.value.assign(1, 1.0);
-    return;
-  }
-  body.field.evaluate_parts({&x, 1}, row);
-  double sum = 0.0;
-  for (const double v : row.value) sum += v;
-  for (double& v : row.value) v /= sum;
-}
 
 /// One body at a point where it is pushed along a normal.
 struct Handle {
@@ -37,7 +24,7 @@ struct Handle {
     mobility = m;
     point = x;
     normal = n;
-    contributions_at(b, x, row);
+    contributions_at(b, {&point, 1}, row);
   }
   /// Speed of the point along the normal, by contributions, with what impulses have added so far.
   [[nodiscard]] double speed(const PartLoads* added) const {
@@ -272,7 +259,7 @@ double approach_inverse_mass(std::span<const ContactBody> bodies, std::span<cons
 double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& shift, const Vec3& along, int cells) {
   SUPPLE_EXPECTS(cells > 0);
   const Box box = overlap_of(a, b, shift);
-  if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite() || !(box.extent().prod() > 0.0)) return 0.0;
+  if (box.empty() || !is_finite(box) || !(box.extent().prod() > 0.0)) return 0.0;
   const CellSum sum = energy_of_cells(a, b, shift, box, cells);
   const bool certain = says_how_thin(a) && says_how_thin(b);
   if (sum.positive > 0 ? sum.resolved(cells) : certain && is_thicker(a, b, box.extent() / cells)) return sum.energy;
@@ -281,8 +268,8 @@ double shifted_energy(const ContactBody& a, const ContactBody& b, const Vec3& sh
 }
 
 double contact_capacity(const ContactBody& a, const ContactBody& b, const Vec3& direction, int cells, double enough) {
-  if (!a.field.surface_box().lower.allFinite() || !a.field.surface_box().upper.allFinite()) {
-    SUPPLE_EXPECTS(b.field.surface_box().extent().allFinite());
+  if (!is_finite(a.field.surface_box())) {
+    SUPPLE_EXPECTS(is_finite(b.field.surface_box()));
     return contact_capacity(b, a, -direction, cells, enough);
   }
   WayThrough way(a, b, direction, std::max(8, cells / 2));

@@ -1,12 +1,15 @@
 /// @file boxes.h
-/// Whether boxes overlap, where most candidates are near and no processor could guess which do.
+/// Whether boxes overlap and where they end.
 #pragma once
 
 #include "supple/core/types.h"
 
 namespace supple::collision {
 
-/// `a.overlaps(b)` with all six comparisons at once.
+/// Whether a box ends on all sides.
+[[nodiscard]] inline bool is_finite(const Box& box) { return box.lower.allFinite() && box.upper.allFinite(); }
+
+/// `a.overlaps(b)` with all six comparisons at once: most candidates are near, and no processor could guess which do.
 [[nodiscard]] inline bool overlap_at_once(const Box& a, const Box& b) {
   unsigned overlap = 1;
   for (const Eigen::Index k : {0, 1, 2}) {

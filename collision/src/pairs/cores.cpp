@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pairs/body_order.h"
+#include "pairs/boxes.h"
 
 namespace supple::collision {
 
@@ -50,7 +51,7 @@ std::optional<int> softer_of_nested_balls(const ContactBody& one, const ContactB
   const double radius = std::min(core->radius, other_core->radius);
   const Box box = one.field.surface_box(), other_box = other.field.surface_box();
   // Half-spaces are round, too, and end nowhere.
-  if (!(box.extent().allFinite() && other_box.extent().allFinite() && (other_core->point - core->point).norm() <= kSameCentre * radius)) return std::nullopt;
+  if (!(is_finite(box) && is_finite(other_box) && (other_core->point - core->point).norm() <= kSameCentre * radius)) return std::nullopt;
   const double end = box.intersection(other_box).upper.x() - core->point.x();
   if (!(end > 0.0)) return std::nullopt;
 

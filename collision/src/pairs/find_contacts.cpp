@@ -29,7 +29,7 @@ struct Columns {
     Vec3 extent = Vec3::Zero();
     double finite = 0.0;
     for (const Box& box : boxes) {
-      if (box.empty() || !box.lower.allFinite() || !box.upper.allFinite()) continue;
+      if (box.empty() || !is_finite(box)) continue;
       spread.include(box.centre());
       extent += box.extent();
       finite += 1.0;
@@ -140,6 +140,74 @@ void collect(const ContactBody& from, const ContactBody& to, const Box& box, dou
   seeds.resize(kept);
 }
 
+/// All pairs of some lists in order: by the first body through counts, by the second within its few.
+std::vector<BodyPair> in_order(std::span<const std::vector<BodyPair>> lists, std::size_t bodies) {
+  std::vector<std::uint32_t> offset(bodies + 2, 0);
+  for (const auto& some : lists) {
+    for (const BodyPair& pair : some) ++offset[pair.a + 2];
+  }
+  for (std::size_t i = 2; i < offset.size(); ++i) offset[i] += offset[i - 1];
+  std::vector<BodyPair> pairs(offset.back());
+  for (const auto& some : lists) {
+    for (const BodyPair& pair : some) pairs[offset[pair.a + 1]++] = pair;
+  }
+  for (std::size_t i = 0; i < bodies; ++i) std::sort(pairs.begin() + offset[i], pairs.begin() + offset[i + 1]);
+  return pairs;
+}
+
+void make_room(std::size_t pairs, std::size_t seeds, ContactCandidates& out) {
+  out.pair.resize(pairs);
+  out.overlap.resize(pairs);
+  out.spacing.resize(pairs);
+  out.convex.resize(pairs);
+  out.offset.resize(pairs + 1);
+  out.seed.resize(seeds);
+  out.offset[0] = 0;
+}
+
+/// What is found of one pair: seeds lie in a slot of its own, so that blocks may run in any order.
+struct Slot {
+  Box overlap;
+  double spacing = 0.0;
+  bool convex = false, kept = false;
+  std::vector<Vec3> seed;
+};
+
+/// Copies what is found of a pair to its place. @param seeds  where its seeds begin
+void put(const Slot& slot, const BodyPair& pair, std::size_t at, std::size_t seeds, ContactCandidates& out) {
+  out.pair[at] = pair;
+  out.overlap[at] = slot.overlap;
+  out.spacing[at] = slot.spacing;
+  out.convex[at] = slot.convex ? 1 : 0;
+  std::copy(slot.seed.begin(), slot.seed.end(), out.seed.begin() + static_cast<std::ptrdiff_t>(seeds));
+  out.offset[at + 1] = static_cast<std::uint32_t>(seeds + slot.seed.size());
+}
+
+/// A body with the mean distance of its samples and the box of its surface.
+struct Sampled {
+  const ContactBody& body;
+  double spacing;
+  const Box& box;
+};
+
+/// Where a pair may touch: between the cores of convex bodies, else at samples near the other body.
+void look_at(const Sampled& a, const Sampled& b, Scratch& scratch, Slot& slot) {
+  slot.overlap = a.box.intersection(b.box);
+  slot.seed.clear();
+  const std::optional<Between> between = between_cores(a.body, b.body, slot.overlap);
+  slot.convex = between.has_value();
+  slot.spacing = 0.0;
+  if (slot.convex) {
+    if (!between->apart) slot.seed.push_back(between->middle);
+  } else {
+    slot.spacing = std::max(a.spacing, b.spacing);
+    const Box near = slot.overlap.inflated(slot.spacing);
+    collect(a.body, b.body, near, a.spacing, scratch, slot.seed);
+    collect(b.body, a.body, near, b.spacing, scratch, slot.seed);
+  }
+  slot.kept = !slot.seed.empty() || (!slot.convex && !is_sampled(a.body) && !is_sampled(b.body));
+}
+
 }  // namespace
 
 std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Executor& executor) {
@@ -189,20 +257,7 @@ std::vector<BodyPair> overlapping_boxes(std::span<const Box> boxes, const Execut
     for (std::size_t j = i + 1; j < wide.size(); ++j) join(wide[i], wide[j], found.back());
     for (const Entry& e : narrow) join(wide[i], e, found.back());
   }
-  // In order: by the first body through counts, by the second within its few.
-  std::vector<std::uint32_t> offset(boxes.size() + 2, 0);
-  for (const auto& some : found) {
-    for (const BodyPair& pair : some) ++offset[pair.a + 2];
-  }
-  for (std::size_t i = 2; i < offset.size(); ++i) offset[i] += offset[i - 1];
-  std::vector<BodyPair> pairs(offset.back());
-  for (const auto& some : found) {
-    for (const BodyPair& pair : some) pairs[offset[pair.a + 1]++] = pair;
-  }
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    std::sort(pairs.begin() + offset[i], pairs.begin() + offset[i + 1]);
-  }
-  return pairs;
+  return in_order(found, boxes.size());
 }
 
 void OverlapList::find(std::span<const Box> boxes, const Executor& executor, std::vector<BodyPair>& out) {
@@ -239,13 +294,6 @@ std::vector<BodyPair> broad_phase(std::span<const ContactBody> bodies, const Con
 
 void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair> pairs, const Executor& executor,
                    ContactCandidates& out) {
-  // Seeds of one pair lie in a slot of its own, so that blocks may run in any order.
-  struct Slot {
-    Box overlap;
-    double spacing = 0.0;
-    bool convex = false, kept = false;
-    std::vector<Vec3> seed;
-  };
   struct Place {
     std::size_t pairs = 0, seeds = 0;
   };
@@ -261,6 +309,7 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
     std::vector<Box>& box;
     std::vector<Place>& places;
     ContactCandidates& out;
+    [[nodiscard]] Sampled sampled(std::uint32_t i) const { return {bodies[i], spacing[i], box[i]}; }
   } job{bodies, pairs, slots, spacing, box, places, out};
 
   constexpr std::size_t kBlock = 16;
@@ -278,23 +327,8 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
     thread_local Scratch scratch;
     Place size;
     for (std::size_t k = begin; k < end; ++k) {
-      const ContactBody& a = job.bodies[job.pairs[k].a];
-      const ContactBody& b = job.bodies[job.pairs[k].b];
       Slot& slot = job.slots[k];
-      slot.overlap = job.box[job.pairs[k].a].intersection(job.box[job.pairs[k].b]);
-      slot.seed.clear();
-      const std::optional<Between> between = between_cores(a, b, slot.overlap);
-      slot.convex = between.has_value();
-      slot.spacing = 0.0;
-      if (slot.convex) {
-        if (!between->apart) slot.seed.push_back(between->middle);
-      } else {
-        slot.spacing = std::max(job.spacing[job.pairs[k].a], job.spacing[job.pairs[k].b]);
-        const Box near = slot.overlap.inflated(slot.spacing);
-        collect(a, b, near, job.spacing[job.pairs[k].a], scratch, slot.seed);
-        collect(b, a, near, job.spacing[job.pairs[k].b], scratch, slot.seed);
-      }
-      slot.kept = !slot.seed.empty() || (!slot.convex && !is_sampled(a) && !is_sampled(b));
+      look_at(job.sampled(job.pairs[k].a), job.sampled(job.pairs[k].b), scratch, slot);
       size.pairs += slot.kept ? 1 : 0;
       size.seeds += slot.seed.size();
     }
@@ -307,25 +341,14 @@ void find_contacts(std::span<const ContactBody> bodies, std::span<const BodyPair
     all.pairs += size.pairs;
     all.seeds += size.seeds;
   }
-  out.pair.resize(all.pairs);
-  out.overlap.resize(all.pairs);
-  out.spacing.resize(all.pairs);
-  out.convex.resize(all.pairs);
-  out.offset.resize(all.pairs + 1);
-  out.seed.resize(all.seeds);
-  out.offset[0] = 0;
+  make_room(all.pairs, all.seeds, out);
   executor.for_blocks(pairs.size(), kBlock, [&job](std::size_t begin, std::size_t end) {
     auto [at, seeds] = job.places[begin / kBlock];
     for (std::size_t k = begin; k < end; ++k) {
       const Slot& slot = job.slots[k];
       if (!slot.kept) continue;
-      job.out.pair[at] = job.pairs[k];
-      job.out.overlap[at] = slot.overlap;
-      job.out.spacing[at] = slot.spacing;
-      job.out.convex[at] = slot.convex ? 1 : 0;
-      std::copy(slot.seed.begin(), slot.seed.end(), job.out.seed.begin() + static_cast<std::ptrdiff_t>(seeds));
+      put(slot, job.pairs[k], at++, seeds, job.out);
       seeds += slot.seed.size();
-      job.out.offset[++at] = static_cast<std::uint32_t>(seeds);
     }
   });
 }

@@ -1,9 +1,9 @@
 #include "supple/collision/soft_body.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
+#include "numbers.h"
 #include "supple/collision/find_contacts.h"
 #include "supple/collision/react.h"
 #include "supple/core/error.h"
@@ -43,7 +43,7 @@ SoftBody::SoftBody(implicit::Skeleton skeleton, ContactMaterial material, std::v
   impl_->pose = std::move(pose);
   impl_->velocity.assign(impl_->pose.size(), Vec3::Zero());
   impl_->angular_velocity = impl_->velocity;
-  double thinnest = std::numeric_limits<double>::infinity();
+  double thinnest = kInfinity;
   for (const implicit::Primitive& primitive : impl_->skeleton.primitive) {
     const double distance = implicit::iso_distance(primitive.kernel, impl_->skeleton.iso);
     thinnest = std::min(thinnest, (distance > 0.0 ? distance : primitive.kernel.radius) / implicit::distance_scale(primitive));
@@ -72,7 +72,7 @@ const implicit::Field& SoftBody::field() const { return impl_->field; }
 const std::vector<Pose>& SoftBody::pose() const { return impl_->pose; }
 
 ContactBody SoftBody::view() const {
-  double core = std::numeric_limits<double>::infinity();
+  double core = kInfinity;
   for (const implicit::Primitive& primitive : impl_->skeleton.primitive) core = std::min(core, implicit::peak(primitive.kernel) - impl_->skeleton.iso);
   return {.field = impl_->field,
           .material = impl_->material,

@@ -1,5 +1,7 @@
 #include "response/energy_loads.h"
 
+#include <numeric>
+
 namespace supple::collision {
 
 Range advance_range(const std::vector<std::uint32_t>& sorted, std::size_t begin, std::uint32_t k) {
@@ -12,6 +14,23 @@ Vec3 velocity_of(const ContactBody& body, std::size_t part, const Vec3& x) {
   Vec3 v = body.velocity.empty() ? Vec3::Zero().eval() : body.velocity[part];
   if (!body.angular_velocity.empty()) v += body.angular_velocity[part].cross(x - body.pose[part].position);
   return v;
+}
+
+void contributions_at(const ContactBody& body, std::span<const Vec3> points, implicit::FieldParts& out) {
+  const std::size_t n = points.size();
+  if (body.pose.size() == 1) {
+    out.offset.resize(n + 1);
+    std::iota(out.offset.begin(), out.offset.end(), 0u);
+    out.part.assign(n, 0);
+    out.value.assign(n, 1.0);
+    return;
+  }
+  body.field.evaluate_parts(points, out);
+  for (std::size_t i = 0; i < n; ++i) {
+    double sum = 0.0;
+    for (std::uint32_t e = out.offset[i]; e < out.offset[i + 1]; ++e) sum += out.value[e];
+    for (std::uint32_t e = out.offset[i]; e < out.offset[i + 1]; ++e) out.value[e] /= sum;
+  }
 }
 
 Squeezed squeezed_of(const ContactSurface& surface, const Range& volume) {

@@ -1,6 +1,6 @@
 /// @file energy_loads.h
-/// The elastic loads on the parts of a body: the gradient of the contact energy over its squeezed region. Explicit reactions and
-/// implicit steps share them.
+/// What reactions, implicit steps and hard cores share of how a body's parts take part: contributions, velocities, and the elastic loads on the parts, which are
+/// the gradient of the contact energy over the squeezed region.
 #pragma once
 
 #include "supple/collision/contact_surface.h"
@@ -16,6 +16,9 @@ struct Range {
 
 /// Velocity of the point of a part that is at x [m/s]; zero where the body has no motion.
 [[nodiscard]] Vec3 velocity_of(const ContactBody& body, std::size_t part, const Vec3& x);
+
+/// By what share each part of a body contributes to its field at points; the shares of a point sum to one.
+void contributions_at(const ContactBody& body, std::span<const Vec3> points, implicit::FieldParts& out);
 
 /// Columns of the squeezed regions of a pair.
 struct Squeezed {

@@ -8,7 +8,7 @@
 namespace supple::collision {
 namespace {
 
-/// Appends the shares of one body at a point; a body without particles has none.
+/// Appends the shares of one body at a point; a body without particles has none. @param parts  contributions
 void add_shares(std::span<const std::uint32_t> particles, const implicit::FieldParts& parts, std::size_t point, double sign,
                 core::ContactPoints& out) {
   if (particles.empty()) return;
@@ -17,11 +17,9 @@ void add_shares(std::span<const std::uint32_t> particles, const implicit::FieldP
     out.share.push_back(sign);
     return;
   }
-  double sum = 0.0;
-  for (std::uint32_t e = parts.offset[point]; e < parts.offset[point + 1]; ++e) sum += parts.value[e];
   for (std::uint32_t e = parts.offset[point]; e < parts.offset[point + 1]; ++e) {
     out.particle.push_back(particles[parts.part[e]]);
-    out.share.push_back(sign * parts.value[e] / sum);
+    out.share.push_back(sign * parts.value[e]);
   }
 }
 
@@ -50,11 +48,9 @@ double take_contributions(const ContactBody& body, const SidePoints& at, const i
     const double force = at.surface.area[i] * at.surface.pressure[i];
     const Vec3 f = at.sign() * force * at.surface.normal[i];
     const std::size_t row = i - at.points.begin;
-    double sum = 0.0;
-    for (std::uint32_t e = parts.offset[row]; e < parts.offset[row + 1]; ++e) sum += parts.value[e];
     for (std::uint32_t e = parts.offset[row]; e < parts.offset[row + 1]; ++e) {
       const std::uint32_t k = parts.part[e];
-      const double share = parts.value[e] / sum;
+      const double share = parts.value[e];
       scratch.force[k] -= share * f;
       scratch.torque[k] -= share * (at.surface.point[i] - body.pose[k].position).cross(f);
       scratch.share[k] += share * force;
@@ -119,8 +115,8 @@ void linearise_contacts(const ReactionInputs& in, std::span<const std::span<cons
     scratch.gradient_b.resize(n);
     a.field.evaluate(x, scratch.value, scratch.gradient_a);
     b.field.evaluate(x, scratch.value, scratch.gradient_b);
-    if (particles[pair.a].size() > 1) a.field.evaluate_parts(x, scratch.parts_a);
-    if (particles[pair.b].size() > 1) b.field.evaluate_parts(x, scratch.parts_b);
+    if (particles[pair.a].size() > 1) contributions_at(a, x, scratch.parts_a);
+    if (particles[pair.b].size() > 1) contributions_at(b, x, scratch.parts_b);
     for (std::size_t i = 0; i < n; ++i) {
       const Vec3& normal = surface.normal[points.begin + i];
       out.point.push_back(x[i]);

@@ -5,6 +5,7 @@
 
 #include "response/energy_loads.h"
 #include "supple/core/error.h"
+#include "surface/kept_results.h"
 
 namespace supple::collision {
 namespace {
@@ -34,11 +35,7 @@ class Side {
     force_.assign(parts, Vec3::Zero());
     torque_.assign(parts, Vec3::Zero());
     share_.assign(parts, 0.0);
-    if (parts > 1) {
-      body.field.evaluate_parts(points, rows_);
-      for (std::size_t i = 0; i < points.size(); ++i) normalise_row(i);
-      return;
-    }
+    if (parts > 1) return contributions_at(body, points, rows_);
     drift_ = body.velocity.empty() ? Vec3::Zero().eval() : body.velocity[0];
     spin_ = body.velocity.empty() || body.angular_velocity.empty() ? Vec3::Zero().eval() : body.angular_velocity[0];
     drift_ -= spin_.cross(body.pose[0].position);
@@ -53,11 +50,7 @@ class Side {
     if (single()) return drift_ + spin_.cross(x);
     if (body_->velocity.empty()) return Vec3::Zero();
     Vec3 sum = Vec3::Zero();
-    for_parts(i, [&](std::size_t k, double lambda) {
-      Vec3 v = body_->velocity[k];
-      if (!body_->angular_velocity.empty()) v += body_->angular_velocity[k].cross(x - body_->pose[k].position);
-      sum += lambda * v;
-    });
+    for_parts(i, [&](std::size_t k, double lambda) { sum += lambda * velocity_of(*body_, k, x); });
     return sum;
   }
 
@@ -127,14 +120,6 @@ class Side {
   }
 
  private:
-  /// Turns the values of a row into contributions lambda that sum to one.
-  void normalise_row(std::size_t i) {
-    const std::uint32_t begin = rows_.offset[i], end = rows_.offset[i + 1];
-    double sum = 0.0;
-    for (std::uint32_t e = begin; e < end; ++e) sum += rows_.value[e];
-    for (std::uint32_t e = begin; e < end; ++e) rows_.value[e] /= sum;
-  }
-
   /// The parts' mean contributions. @return whether any load is there to share
   bool share_out(std::span<const double> load) {
     std::fill(share_.begin(), share_.end(), 0.0);
@@ -357,6 +342,18 @@ struct Reactions {
   std::vector<std::uint32_t> of_body;
   ContactCount contacts;
 
+  /// Of every body, where friction is to stop what slides within a step.
+  void count_contacts(std::size_t bodies, const ReactionInputs& in) {
+    contacts.clear();
+    if (!(in.settings.step > 0.0) || in.settings.stick.stiffness > 0.0) return;
+    contacts.resize(bodies);
+    for (const ContactSurface::Summary& s : in.surface.summary) {
+      if (!(s.force.norm() > 0.0)) continue;
+      ++contacts[s.bodies.a];
+      ++contacts[s.bodies.b];
+    }
+  }
+
   void begin(std::span<const ContactBody> bodies, std::span<const ContactSurface::Summary> summary) {
     pair.resize(summary.size());
     offset.assign(bodies.size() + 2, 0);
@@ -400,19 +397,11 @@ ReactionReport react(const ReactionInputs& in, const Executor& executor, const R
   thread_local Reactions kept;
   Reactions& all = kept;  // of the calling thread, whoever fills it
   all.begin(bodies, surface.summary);
-  all.contacts.clear();
-  if (settings.step > 0.0 && !(settings.stick.stiffness > 0.0)) {
-    all.contacts.resize(bodies.size());
-    for (const ContactSurface::Summary& s : surface.summary) {
-      if (!(s.force.norm() > 0.0)) continue;
-      ++all.contacts[s.bodies.a];
-      ++all.contacts[s.bodies.b];
-    }
-  }
+  all.count_contacts(bodies.size(), in);
   // In the portions of stage 6, so that threads find the points that they made.
-  constexpr std::size_t kPortion = 512, kPairs = 4, kBodies = 32;
+  constexpr std::size_t kBodies = 32;
   for (std::size_t portion = 0; portion < pairs; portion += kPortion) {
-    executor.for_blocks(std::min(kPortion, pairs - portion), kPairs, [&, portion](std::size_t begin, std::size_t end) {
+    executor.for_blocks(std::min(kPortion, pairs - portion), kPairsTogether, [&, portion](std::size_t begin, std::size_t end) {
       const std::size_t first = portion + begin, last = portion + end;
       const auto first_of = [first](const std::vector<std::uint32_t>& pair) {
         return static_cast<std::size_t>(std::lower_bound(pair.begin(), pair.end(), first) - pair.begin());

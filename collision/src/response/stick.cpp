@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "response/energy_loads.h"
+
 namespace supple::collision {
 namespace {
 
@@ -114,20 +116,18 @@ void commit_sticks(std::span<const ContactBody> bodies, const ContactRules& rule
     const bool asleep = rests(s.pair.a) && rests(s.pair.b);
     if (asleep) next.push_back(s);
   }
-  std::size_t end = 0;
+  Range points;
   for (std::uint32_t k = 0; k < surface.summary.size(); ++k) {
     const ContactSurface::Summary& summary = surface.summary[k];
-    const std::size_t begin = end;
-    while (end < surface.pair.size() && surface.pair[end] == k) ++end;
+    points = advance_range(surface.pair, points.end, k);
     const double load = summary.force.norm();
     if (!(load > 0.0)) continue;
     const ContactBody &a = bodies[summary.bodies.a], &b = bodies[summary.bodies.b];
     const double friction = material_of(bodies, rules, summary.bodies).friction;
     if (!(friction > 0.0)) continue;
     const Vec3 normal = -summary.force / load;
-    const std::size_t count = end - begin;
-    const StickArms arms = arms_of(std::span(surface.point).subspan(begin, count), std::span(surface.area).subspan(begin, count),
-                                   std::span(surface.pressure).subspan(begin, count), summary.centre_of_pressure, normal);
+    const auto of_pair = [&points](const auto& array) { return std::span(array).subspan(points.begin, points.end - points.begin); };
+    const StickArms arms = arms_of(of_pair(surface.point), of_pair(surface.area), of_pair(surface.pressure), summary.centre_of_pressure, normal);
     Vec3 displacement = Vec3::Zero();
     double twist = 0.0;
     if (const StickSpring* before = state.find(summary.bodies)) {

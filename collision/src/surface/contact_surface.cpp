@@ -86,10 +86,10 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   boxes.resize(bodies.size());
   partners.build(bodies.size(), candidates.pair);
   // In portions, so that what pairs leave behind is joined while it is still near, and buffers stay small.
-  constexpr std::size_t kPortion = 512, kBlock = 4, kMostKept = std::size_t{32} << 20;
+  constexpr std::size_t kMostKept = std::size_t{32} << 20;
   const std::size_t pairs = candidates.pair.size();
   if (results.size() < std::min(pairs, kPortion)) results.resize(std::min(pairs, kPortion));
-  begins.resize(kPortion / kBlock);
+  begins.resize(kPortion / kPairsTogether);
   struct Job {
     ContactQuery query;
     std::span<Box> boxes;
@@ -109,23 +109,23 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   Extent size;
   for (; job.first < pairs; job.first += kPortion) {
     const std::size_t count = std::min(kPortion, pairs - job.first);
-    executor.for_blocks(count, kBlock, [&job](std::size_t begin, std::size_t end) {
+    executor.for_blocks(count, kPairsTogether, [&job](std::size_t begin, std::size_t end) {
       thread_local PairSolver solver;
       Extent block;
       for (std::size_t k = begin; k < end; ++k) {
         solver.solve(job.query, job.first + k, job.results[k]);
         block += extent_of(job.results[k], job.parted(k));
       }
-      job.begins[begin / kBlock] = block;
+      job.begins[begin / kPairsTogether] = block;
     });
-    for (std::size_t block = 0; block * kBlock < count; ++block) {
+    for (std::size_t block = 0; block * kPairsTogether < count; ++block) {
       const Extent extent = begins[block];
       begins[block] = size;
       size += extent;
     }
     resize(out, size, true);
-    executor.for_blocks(count, kBlock, [&job](std::size_t begin, std::size_t end) {
-      Extent at = job.begins[begin / kBlock];
+    executor.for_blocks(count, kPairsTogether, [&job](std::size_t begin, std::size_t end) {
+      Extent at = job.begins[begin / kPairsTogether];
       for (std::size_t k = begin; k < end; ++k) {
         const std::array<bool, 2> parted = job.parted(k);
         const Extent extent = extent_of(job.results[k], parted);

@@ -1,14 +1,16 @@
 #include "surface/find_peak.h"
 
 #include <cmath>
-#include <limits>
 #include <numeric>
+
+#include "numbers.h"
+#include "pairs/boxes.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
 
 constexpr std::size_t kMostHills = 16;
-constexpr int kMostSteps = 40;
 constexpr double kRound = 5e-3;  // of the curvatures: principal directions of less difference depend on rounding
 
 /// What slopes along the axis say. A body so deep in the other that its pressure hardly falls, or rises, from Sigma on has the extent.
@@ -59,7 +61,7 @@ void PeakFinder::start_from_seeds(PairPressure& pressure, std::span<const Vec3> 
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     const double a = batch_.a[i] / pressure.modulus(0), b = batch_.b[i] / pressure.modulus(1);
     score_[i] = a + b;
-    (std::min(a, b) > -1e-9 && score_[i] > 0.0 ? out.inside : out.beside).push_back(start_at(i));
+    (std::min(a, b) > -kOnSurface && score_[i] > 0.0 ? out.inside : out.beside).push_back(start_at(i));
   }
   order_.resize(seeds.size());
   std::iota(order_.begin(), order_.end(), 0u);
@@ -79,7 +81,7 @@ void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, Sta
   out.hill.clear();
   out.inside.clear();
   out.beside.clear();
-  if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite()) return;
+  if (overlap.empty() || !is_finite(overlap)) return;
   constexpr int kNodes = 11;
   constexpr double kStep = 1.0 / (kNodes - 1);
   batch_.resize(kNodes * kNodes * kNodes);
@@ -120,23 +122,76 @@ void PeakFinder::start_from_scan(PairPressure& pressure, const Box& overlap, Sta
   for (std::size_t n = 0; n < order_.size() && n < kMostHills; ++n) out.hill.push_back(start_at(order_[n]));
 }
 
-/// Newton's method along the gradient of p_A - p_B.
-Vec3 PeakFinder::foot_on_sigma(PairPressure& pressure, Vec3 x, double reach) {
+Vec3 PeakFinder::foot_on_sigma(PairPressure& pressure, const Vec3& x, double reach) {
   constexpr int kSteps = 4;
   batch_.resize(1);
+  batch_.point[0] = x;
   for (int step = 0; step < kSteps; ++step) {
-    batch_.point[0] = x;
     pressure.evaluate(batch_);
-    const Vec3 slope = batch_.slope_a[0] - batch_.slope_b[0];
-    const double square = slope.squaredNorm();
-    if (!(square > 0.0)) break;
-    Vec3 move = ((batch_.b[0] - batch_.a[0]) / square) * slope;
-    const double length = move.norm();
-    if (length > reach) move *= reach / length;
-    x += move;
+    step_to_sigma(batch_, reach);
   }
+  const Vec3 foot = batch_.point[0];
   batch_.resize(5);
-  return x;
+  return foot;
+}
+
+/// The axis from the slopes at a place, for the first step. @return a direction across it; nothing where the slopes are the same
+std::optional<Vec3> PeakFinder::first_axis(PairPressure& pressure, const Vec3& x, Vec3& axis) {
+  batch_.resize(1);
+  batch_.point[0] = x;
+  pressure.evaluate(batch_);
+  axis = batch_.slope_b[0] - batch_.slope_a[0];
+  const double norm = axis.norm();
+  if (!(norm > 0.0)) return std::nullopt;
+  axis /= norm;
+  batch_.resize(5);
+  return pressure.tangent(x, axis).value_or(axis.unitOrthogonal());
+}
+
+/// Evaluates a place and four beside it, h away along u and v.
+void PeakFinder::look_around(PairPressure& pressure, const Vec3& x, const Vec3& u, const Vec3& v, double h) {
+  batch_.point[0] = x;
+  batch_.point[1] = x + h * u;
+  batch_.point[2] = x - h * u;
+  batch_.point[3] = x + h * v;
+  batch_.point[4] = x - h * v;
+  pressure.evaluate(batch_);
+}
+
+/// Second derivatives of a body's pressure along u and v, by differences of the slopes `h` away.
+PeakFinder::Bends PeakFinder::bends_of(int side, const Vec3& u, const Vec3& v, double h) const {
+  const std::vector<Vec3>& g = side == 0 ? batch_.slope_a : batch_.slope_b;
+  const auto second = [&](std::size_t along, const Vec3& direction) { return (g[2 * along + 1] - g[2 * along + 2]).dot(direction) / (2.0 * h); };
+  return {second(0, u), 0.5 * (second(0, v) + second(1, u)), second(1, v)};
+}
+
+/// The frame at a place on Sigma with the pressure `frame.peak`.
+/// @param curvature  of the pressure on Sigma along u and v   @param gap  of p_A - p_B   @param flattest  curvature that is believed
+void PeakFinder::set_frame(PairPressure& pressure, const Tangents& at, const Bends& curvature, const Bends& gap, double flattest, PeakFrame& frame) {
+  const Principal p = principal(curvature.uu, curvature.uv, curvature.vv);
+  const bool round = p.first - p.second <= kRound * (std::abs(curvature.uu) + std::abs(curvature.vv) + flattest);
+  const double cs = round ? 1.0 : p.cosine, sn = round ? 0.0 : p.sine;
+  const Vec3 one = cs * at.u + sn * at.v, two = frame.axis.cross(one);
+  // Of faces as long as features are; where their rims lie is sought in any case.
+  const double face = frame.flat ? 2.0 * frame.peak / (pressure.feature_size() * pressure.feature_size()) : flattest;
+  const double scale_u = std::max(std::abs(round ? curvature.uu : p.first), face), scale_v = std::max(std::abs(round ? curvature.vv : p.second), face);
+  const double sign_u = sign_of(pressure, frame.origin, frame.axis, one), sign_v = sign_of(pressure, frame.origin, frame.axis, two);
+  frame.u = sign_u / std::sqrt(scale_u) * one;
+  frame.v = sign_v / std::sqrt(scale_v) * two;
+  // Sigma: (p_A - p_B)(x) = 0 with slope -steepness along the axis.
+  const double d_uu = gap.uu / at.steepness, d_uv = gap.uv / at.steepness, d_vv = gap.vv / at.steepness;
+  frame.height_uu = (cs * cs * d_uu + 2.0 * cs * sn * d_uv + sn * sn * d_vv) / scale_u;
+  frame.height_uv = sign_u * sign_v * (-cs * sn * d_uu + (cs * cs - sn * sn) * d_uv + cs * sn * d_vv) / std::sqrt(scale_u * scale_v);
+  frame.height_vv = (sn * sn * d_uu - 2.0 * cs * sn * d_uv + cs * cs * d_vv) / scale_v;
+}
+
+/// Newton's step to where the pressure is largest along the tangents, where curvatures smaller than the flattest one are not believed.
+PeakFinder::Ascent PeakFinder::ascent(const Tangents& at, const Bends& curvature, double flattest, const Vec3& slope) {
+  const Principal p = principal(curvature.uu, curvature.uv, curvature.vv);
+  const Vec3 first = p.cosine * at.u + p.sine * at.v, other = at.axis.cross(first);
+  const double c1 = std::max(std::abs(p.first), flattest), c2 = std::max(std::abs(p.second), flattest);
+  const double g1 = slope.dot(first), g2 = slope.dot(other);
+  return {(g1 / c1) * first + (g2 / c2) * other, 0.5 * (g1 * g1 / c1 + g2 * g2 / c2), std::min(std::abs(p.first), std::abs(p.second))};
 }
 
 std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& start, double extent, bool convex, bool stop_on_faces) {
@@ -144,34 +199,17 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
   const double h = 1e-4 * reach;
   PeakFrame frame;
   Vec3 x = start;
-  double before = -std::numeric_limits<double>::infinity();  // min(p_A, p_B) and |p_A - p_B| at the last point kept
+  double before = -kInfinity;  // min(p_A, p_B) and |p_A - p_B| at the last point kept
   double gap_before = 0.0;
-  Vec3 kept = start, step = Vec3::Zero(), along = Vec3::Zero();
+  Vec3 kept = start, step = Vec3::Zero();
   bool lifted = false;
-  batch_.resize(5);
-  for (int iteration = 0; iteration < kMostSteps; ++iteration) {
+  const std::optional<Vec3> along = first_axis(pressure, x, frame.axis);
+  if (!along) return std::nullopt;
+  for (int iteration = 0; iteration < kBracketSteps; ++iteration) {
     // The tangents come from the normal at the last point; they need not be exact.
-    if (iteration == 0) {
-      batch_.resize(1);
-      batch_.point[0] = x;
-      pressure.evaluate(batch_);
-      frame.axis = batch_.slope_b[0] - batch_.slope_a[0];
-      const double norm = frame.axis.norm();
-      if (!(norm > 0.0)) return std::nullopt;
-      frame.axis /= norm;
-      batch_.resize(5);
-      along = pressure.tangent(x, frame.axis).value_or(frame.axis.unitOrthogonal());
-    }
-    Vec3 u = (along - along.dot(frame.axis) * frame.axis).normalized();
-    Vec3 v = frame.axis.cross(u);
-    batch_.point[0] = x;
-    batch_.point[1] = x + h * u;
-    batch_.point[2] = x - h * u;
-    batch_.point[3] = x + h * v;
-    batch_.point[4] = x - h * v;
-    pressure.evaluate(batch_);
-    const double a = batch_.a[0], b = batch_.b[0];
-    const double lower = std::min(a, b), gap = std::abs(a - b);
+    Vec3 u = (*along - along->dot(frame.axis) * frame.axis).normalized();
+    look_around(pressure, x, u, frame.axis.cross(u), h);
+    const double a = batch_.a[0], b = batch_.b[0], lower = std::min(a, b), gap = std::abs(a - b);
     const Vec3 slope = batch_.slope_a[0] - batch_.slope_b[0];
     const double steepness = slope.norm();
     if (!(steepness > 0.0)) return std::nullopt;
@@ -198,51 +236,27 @@ std::optional<PeakFrame> PeakFinder::climb(PairPressure& pressure, const Vec3& s
 
     const double noise = pressure.noise(x, steepness);
     u = (u - u.dot(axis) * axis).normalized();
-    v = axis.cross(u);
+    const Vec3 v = axis.cross(u);
+    const Tangents at{u, v, axis, steepness};
     // Weights of the Lagrange function q = (1 - w) p_A + w p_B, whose gradient is tangential to Sigma.
     const Vec3 tangential = (1.0 - w) * batch_.slope_a[0] + w * batch_.slope_b[0];
-    const auto second = [&](int side, int i, const Vec3& direction) {
-      const std::vector<Vec3>& g = side == 0 ? batch_.slope_a : batch_.slope_b;
-      const auto k = static_cast<std::size_t>(2 * i);
-      return (g[k + 1] - g[k + 2]).dot(direction) / (2.0 * h);
-    };
-    const double a_uu = second(0, 0, u), a_uv = 0.5 * (second(0, 0, v) + second(0, 1, u)), a_vv = second(0, 1, v);
-    const double b_uu = second(1, 0, u), b_uv = 0.5 * (second(1, 0, v) + second(1, 1, u)), b_vv = second(1, 1, v);
-    const double q_uu = -((1.0 - w) * a_uu + w * b_uu), q_uv = -((1.0 - w) * a_uv + w * b_uv), q_vv = -((1.0 - w) * a_vv + w * b_vv);
+    const Bends of_a = bends_of(0, u, v, h), of_b = bends_of(1, u, v, h), q = of_a.mixed(of_b, -(1.0 - w), -w);
     // A patch longer than `extent` along a direction of no curvature is not believed.
     const double flattest = 2.0 * std::max(std::abs(level), noise) / (extent * extent);
-    const Principal p = principal(q_uu, q_uv, q_vv);
-    const Vec3 first = p.cosine * u + p.sine * v, other = axis.cross(first);
-    const double c1 = std::max(std::abs(p.first), flattest), c2 = std::max(std::abs(p.second), flattest);
-    const double g1 = tangential.dot(first), g2 = tangential.dot(other);
-    const double gain = 0.5 * (g1 * g1 / c1 + g2 * g2 / c2);
-
-    const bool flat = stop_on_faces && level > noise && std::min(std::abs(p.first), std::abs(p.second)) <= flattest;
+    const Ascent up = ascent(at, q, flattest, tangential);
+    const bool flat = stop_on_faces && level > noise && up.least_curvature <= flattest;
     step = ((a - b) / steepness) * axis;
-    if (!flat) step += (g1 / c1) * first + (g2 / c2) * other;
+    if (!flat) step += up.step;
     const bool on_sigma = gap <= 1e-6 * std::abs(level) + noise;
-    const bool at_top = gain <= 1e-12 * std::abs(level) + 1e-3 * noise;
+    const bool at_top = up.gain <= 1e-12 * std::abs(level) + 1e-3 * noise;
     frame.axis = axis;
     frame.flat = flat && on_sigma;
-    if (frame.flat || (on_sigma && at_top) || iteration + 1 == kMostSteps) {
+    if (frame.flat || (on_sigma && at_top) || iteration + 1 == kBracketSteps) {
       if (level <= pressure.noise_on_sigma(x, fall, rise) || !on_sigma) return std::nullopt;
       frame.origin = x;
       frame.peak = level;
-      const bool round = p.first - p.second <= kRound * (std::abs(q_uu) + std::abs(q_vv) + flattest);
-      const double cs = round ? 1.0 : p.cosine, sn = round ? 0.0 : p.sine;
-      const Vec3 one = cs * u + sn * v, two = axis.cross(one);
-      // Of faces as long as features are; where their rims lie is sought in any case.
-      const double face = frame.flat ? 2.0 * level / (pressure.feature_size() * pressure.feature_size()) : flattest;
-      const double scale_u = std::max(std::abs(round ? q_uu : p.first), face), scale_v = std::max(std::abs(round ? q_vv : p.second), face);
-      const double sign_u = sign_of(pressure, x, axis, one), sign_v = sign_of(pressure, x, axis, two);
-      frame.u = sign_u / std::sqrt(scale_u) * one;
-      frame.v = sign_v / std::sqrt(scale_v) * two;
+      set_frame(pressure, at, q, of_a.mixed(of_b, 1.0, -1.0), flattest, frame);
       set_depths(frame, fall, rise, extent);
-      // Sigma: (p_A - p_B)(x) = 0 with slope -steepness along the axis.
-      const double d_uu = (a_uu - b_uu) / steepness, d_uv = (a_uv - b_uv) / steepness, d_vv = (a_vv - b_vv) / steepness;
-      frame.height_uu = (cs * cs * d_uu + 2.0 * cs * sn * d_uv + sn * sn * d_vv) / scale_u;
-      frame.height_uv = sign_u * sign_v * (-cs * sn * d_uu + (cs * cs - sn * sn) * d_uv + cs * sn * d_vv) / std::sqrt(scale_u * scale_v);
-      frame.height_vv = (sn * sn * d_uu - 2.0 * cs * sn * d_uv + cs * cs * d_vv) / scale_v;
       return frame;
     }
     const double length = step.norm();
@@ -258,7 +272,7 @@ std::optional<PeakFrame> PeakFinder::find_on_axis(PairPressure& pressure, const 
   PeakFrame frame;
   frame.axis = axis.direction;
   frame.origin = axis.point + (start - axis.point).dot(axis.direction) * axis.direction;
-  for (int iteration = 0; iteration < kMostSteps; ++iteration) {
+  for (int iteration = 0; iteration < kBracketSteps; ++iteration) {
     batch_.resize(1);
     batch_.point[0] = frame.origin;
     pressure.evaluate(batch_);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "surface/pair_pressure.h"
+#include "surface/plane.h"
 
 namespace supple::collision {
 
@@ -26,6 +27,12 @@ struct PeakFrame {
   double thickness = 0.0;    ///< of the overlap along the axis, to first order [m]
   double depth[2] = {0.0, 0.0};  ///< share of A's and of B's squeezed region in it [m]
   bool flat = false;             ///< not the peak: the pressure is that of faces, flat along some direction
+
+  /// A way over the tangent plane [m], from its parts along u and v in units of these; and the parts of a way.
+  [[nodiscard]] Vec3 across(const Vec2& parts) const { return parts.x() * u + parts.y() * v; }
+  [[nodiscard]] Vec2 parts_of(const Vec3& way) const { return {way.dot(u) / u.squaredNorm(), way.dot(v) / v.squaredNorm()}; }
+  /// A place over the tangent plane, and at a height above it [m].
+  [[nodiscard]] Vec3 place(const Vec2& parts, double height) const { return origin + across(parts) + height * axis; }
 };
 
 /// Principal directions of a symmetric 2 x 2 matrix: of the larger eigenvalue first.
@@ -70,7 +77,29 @@ class PeakFinder {
   [[nodiscard]] std::optional<PeakFrame> find_on_axis(PairPressure& pressure, const CommonAxis& axis, const Vec3& start, double extent);
 
  private:
-  Vec3 foot_on_sigma(PairPressure& pressure, Vec3 x, double reach);
+  /// Second derivatives along two directions.
+  struct Bends {
+    double uu, uv, vv;
+    [[nodiscard]] Bends mixed(const Bends& other, double share, double share_of_other) const {
+      return {share * uu + share_of_other * other.uu, share * uv + share_of_other * other.uv, share * vv + share_of_other * other.vv};
+    }
+  };
+  /// Unit tangents of Sigma and its normal, and the slope of p_A - p_B [Pa/m].
+  struct Tangents {
+    Vec3 u, v, axis;
+    double steepness;
+  };
+  /// A step up along Sigma, and what the pressure gains by it.
+  struct Ascent {
+    Vec3 step;
+    double gain, least_curvature;
+  };
+  static Ascent ascent(const Tangents& at, const Bends& curvature, double flattest, const Vec3& slope);
+  std::optional<Vec3> first_axis(PairPressure& pressure, const Vec3& x, Vec3& axis);
+  void look_around(PairPressure& pressure, const Vec3& x, const Vec3& u, const Vec3& v, double h);
+  [[nodiscard]] Bends bends_of(int side, const Vec3& u, const Vec3& v, double h) const;
+  static void set_frame(PairPressure& pressure, const Tangents& at, const Bends& curvature, const Bends& gap, double flattest, PeakFrame& frame);
+  Vec3 foot_on_sigma(PairPressure& pressure, const Vec3& x, double reach);
   /// Point n of `batch_`, once that is evaluated.
   [[nodiscard]] StartPoint start_at(std::size_t n) const { return {batch_.point[n], batch_.slope_b[n] - batch_.slope_a[n]}; }
 

@@ -10,6 +10,9 @@
 
 namespace supple::collision {
 
+/// Pairs are solved, joined and reacted to in portions, so that what one step leaves is still near for the next; a thread takes so many of them together.
+inline constexpr std::size_t kPortion = 512, kPairsTogether = 4;
+
 /// Memory of the arrays of a patch [byte].
 [[nodiscard]] inline std::size_t room_of(const PatchPoints& points) {
   const auto bytes = [](const auto&... arrays) { return (std::size_t{0} + ... + (arrays.capacity() * sizeof(arrays[0]))); };

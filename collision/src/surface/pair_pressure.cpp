@@ -1,9 +1,22 @@
 #include "surface/pair_pressure.h"
 
-#include <array>
 #include <cmath>
 
+#include "surface/accuracy.h"
+
 namespace supple::collision {
+
+void step_to_sigma(PressureBatch& batch, double longest) {
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const Vec3 slope = batch.slope_a[i] - batch.slope_b[i];
+    const double square = slope.squaredNorm();
+    if (!(square > 0.0)) continue;
+    Vec3 move = ((batch.b[i] - batch.a[i]) / square) * slope;
+    const double length = move.norm();
+    if (length > longest) move *= longest / length;
+    batch.point[i] += move;
+  }
+}
 
 std::optional<Vec3> PairPressure::tangent(const Vec3& from, const Vec3& normal, const Vec3* apart) const {
   constexpr double kLeast = 1e-3;  // of the length: what rounding leaves is not a direction
@@ -26,27 +39,20 @@ std::optional<Vec3> PairPressure::tangent(const Vec3& from, const Vec3& normal, 
 }
 
 double PairPressure::overlap_out_of(int side, const Vec3& from, const Vec3& way, double longest) {
-  constexpr int kMostSteps = 200, kHalvings = 40;
+  constexpr int kMostSteps = 200;
   constexpr double kEnough = 1e-6;  // of the longest step
-  std::array<double, 1> value;
-  std::array<Vec3, 1> slope;
   double t = 0.0;
   for (int i = 0; i < kMostSteps; ++i) {
-    const Vec3 x = from + t * way;
-    evaluate(side, {&x, 1}, value, slope);
-    const double fall = -slope[0].dot(way);
-    const double step = fall > 0.0 ? std::clamp(value[0] / fall, -longest, longest) : std::copysign(longest, value[0]);
+    Vec3 slope;
+    const double p = value(side, from + t * way, slope), fall = -slope.dot(way);
+    const double step = fall > 0.0 ? std::clamp(p / fall, -longest, longest) : std::copysign(longest, p);
     t += step;
     if (std::abs(step) < kEnough * longest) break;
   }
-  const auto other_presses = [&](double at) {
-    const Vec3 x = from + at * way;
-    evaluate(1 - side, {&x, 1}, value);
-    return value[0] > 0.0;
-  };
+  const auto other_presses = [&](double at) { return value(1 - side, from + at * way) > 0.0; };
   if (!(t > 0.0) || other_presses(t)) return t;
   double low = 0.0;
-  for (int i = 0; i < kHalvings; ++i) {
+  for (int i = 0; i < kBracketSteps; ++i) {
     const double middle = 0.5 * (low + t);
     (other_presses(middle) ? low : t) = middle;
   }

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "numbers.h"
 #include "supple/collision/bodies.h"
 #include "supple/implicit/field.h"
 #include "supple/implicit/kinks.h"
@@ -31,6 +31,28 @@ struct PressureBatch {
     slope_b.resize(n);
   }
 };
+
+/// Third bodies, which take what they press harder on.
+using Thirds = std::span<const ContactBody* const>;
+
+/// What both pressures at a place, and their slopes, tell to first order of Sigma along an axis through it. The slopes are only looked at.
+struct AlongAxis {
+  const Vec3 &slope_a, &slope_b;  // [Pa/m]
+  double up_a, up_b, rate;        // along the axis; of p_B - p_A
+
+  AlongAxis(const Vec3& of_a, const Vec3& of_b, const Vec3& axis) : slope_a(of_a), slope_b(of_b), up_a(of_a.dot(axis)), up_b(of_b.dot(axis)), rate(up_b - up_a) {}
+  /// Whether Sigma is a graph along the axis. @param least  cosine between its normal and the axis
+  [[nodiscard]] bool upright(double least) const { return rate > least * (slope_b - slope_a).norm(); }
+  /// How far Sigma lies along the axis [m], and the pressure there.
+  [[nodiscard]] double lift(double a, double b) const { return (a - b) / rate; }
+  [[nodiscard]] double pressure(double a, double b) const { return (a * up_b - b * up_a) / rate; }
+  /// Along Sigma above a way: derivatives of the pressure and of the height.
+  [[nodiscard]] double slope(const Vec3& way) const { return (slope_a.dot(way) * up_b - slope_b.dot(way) * up_a) / rate; }
+  [[nodiscard]] double rise(const Vec3& way) const { return (slope_a - slope_b).dot(way) / rate; }
+};
+
+/// One step of Newton's method towards p_A = p_B along its gradient, no longer than `longest` [m], from each place of a batch that has been evaluated.
+void step_to_sigma(PressureBatch& batch, double longest);
 
 class PairPressure {
  public:
@@ -91,6 +113,16 @@ class PairPressure {
     for (double& v : values) v *= modulus_[side];
     evaluations_ += points.size();
   }
+  [[nodiscard]] double value(int side, const Vec3& x) {
+    double p;
+    evaluate(side, {&x, 1}, {&p, 1});
+    return p;
+  }
+  [[nodiscard]] double value(int side, const Vec3& x, Vec3& slope) {
+    double p;
+    evaluate(side, {&x, 1}, {&p, 1}, {&slope, 1});
+    return p;
+  }
 
   /// Whether the box may hold a place where both bodies press, and equally hard, by their bounds. @param least  by more than that [Pa]
   [[nodiscard]] bool may_meet(const Box& box, double least = 0.0) const {
@@ -117,12 +149,12 @@ class PairPressure {
   [[nodiscard]] double largest_modulus() const noexcept { return std::max(modulus_[0], modulus_[1]); }
   /// Round-off of the pressures at x [Pa], which that of the coordinates adds to. @param steepness  of their difference [Pa/m]
   [[nodiscard]] double noise(const Vec3& x, double steepness) const {
-    return 16.0 * std::numeric_limits<double>::epsilon() * std::max(largest_modulus(), steepness * x.lpNorm<Eigen::Infinity>());
+    return 16.0 * kEpsilon * std::max(largest_modulus(), steepness * x.lpNorm<Eigen::Infinity>());
   }
   /// The same of what both are on Sigma, in which the softer body has the larger say. @param slope_a, slope_b  along the normal, either way [Pa/m]
   [[nodiscard]] double noise_on_sigma(const Vec3& x, double slope_a, double slope_b) const {
     const double a = std::abs(slope_a), b = std::abs(slope_b), modulus = modulus_[0] * b + modulus_[1] * a;
-    return 16.0 * std::numeric_limits<double>::epsilon() * std::max(modulus, 4.0 * a * b * x.lpNorm<Eigen::Infinity>()) / (a + b);
+    return 16.0 * kEpsilon * std::max(modulus, 4.0 * a * b * x.lpNorm<Eigen::Infinity>()) / (a + b);
   }
   /// Length [m] that steps are limited by: the smaller feature size of the two bodies.
   [[nodiscard]] double feature_size() const {

@@ -1,12 +1,11 @@
 #include "surface/pair_solver.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 
+#include "numbers.h"
 #include "pairs/body_order.h"
 #include "pairs/boxes.h"
 #include "pairs/cores.h"
@@ -18,6 +17,9 @@ namespace {
 /// What flows through what third bodies leave of Sigma is shared out among pairs in another way than the energy of the space that they lose: both are right in
 /// their sums, but do not mix. Errors finer than this are met where all pairs tell the former.
 constexpr double kAllFlow = 1e-7;
+
+/// Error below which panels may miss slivers of that size between their nodes.
+constexpr double kFinestPanels = 1e-4;
 
 /// Whether a body is convex and certainly does not reach a box: cheaper than bounds of its field.
 bool clear_of(const ContactBody& body, const Box& box) {
@@ -72,7 +74,8 @@ void Partners::build(std::size_t bodies, std::span<const BodyPair> pairs) {
 }
 
 /// Partners of either body whose surfaces may reach the overlap; of teams of obstacles the first ones, and not that of the pair.
-void PairSolver::find_thirds(const Job& job, const BodyPair& pair, const Partners& partners) {
+void PairSolver::find_thirds(const Job& job, const Partners& partners) {
+  const BodyPair& pair = job.pair;
   third_.clear();
   third_bodies_.clear();
   const auto add = [&](std::uint32_t c) {
@@ -180,14 +183,14 @@ bool PairSolver::thirds_press_beside(const Job& job, const PairResult& out) {
 /// @return false where neither fits, or they contradict each other
 bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   if (job.a.pose.size() > 1 || job.b.pose.size() > 1) return false;  // their squeezed regions are not cut that exactly
-  constexpr double kFinestStar = 1e-4, kSafety = 3.0;
+  constexpr double kSafety = 3.0;
   constexpr double kSmall = 0.05;  // of the area of the patches: a star tells imprints that take less from each other by few of its rays
   const double whole = out.summary.area;
   const std::span<const PolarCover> covers = patches_.covers();
   const bool faces = std::any_of(covers.begin(), covers.end(), [](const PolarCover& cover) { return cover.frame.flat; });
   if (faces) return imprints_cut(job, out);
   const double error = job.settings().error;
-  const bool star = stars_cut(job, std::max(error, kFinestStar), out), coarse = error >= kFinestStar;
+  const bool star = stars_cut(job, std::max(error, kFinestPanels), out), coarse = error >= kFinestPanels;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
   const bool unsure = out.points.unsure[0] || out.points.unsure[1];  // of what a body loses that is not known to be convex
   if (star && coarse && !small && !unsure && (out.points.point.empty() || meets(out, error))) return true;
@@ -227,12 +230,10 @@ bool PairSolver::may_leave_imprints(const Job& job, PairResult& out) {
   const std::optional<double> taken = taken_by_imprints(job, kMost * error, out);
   if (!taken) return false;
   if (out.summary.error_estimate + *taken > error) {
-    PolarJob finer = job.polar;
-    finer.settings.error = error - *taken;
     out.clear();
-    if (!rings(finer, job.overlap, job.convex, out) || out.summary.error_estimate + *taken > error) {
+    if (!rings(job, error - *taken, out) || out.summary.error_estimate + *taken > error) {
       out.clear();
-      rings(job.polar, job.overlap, job.convex, out);
+      rings(job, error, out);
       return false;
     }
     out.summary.rule = ContactRule::Polar;
@@ -249,12 +250,12 @@ void PairSolver::take_all_thirds(const Job& job) {
   }
 }
 
-/// Third bodies as what bounds panels. @param taken  of them
-void PairSolver::take_third_levels(const Job& job, std::span<const ContactBody* const> taken) {
+/// `third_bodies_` as what bounds panels.
+void PairSolver::take_third_levels(const Job& job) {
   third_levels_.clear();
   for (std::size_t t = 0; t < third_.size(); ++t) {
     const ContactBody* const third = &thirds_.all()[t];
-    if (std::find(taken.begin(), taken.end(), third) != taken.end()) third_levels_.push_back({third, third_[t] > job.pair.b});
+    if (std::find(third_bodies_.begin(), third_bodies_.end(), third) != third_bodies_.end()) third_levels_.push_back({third, third_[t] > job.pair.b});
   }
 }
 
@@ -265,42 +266,42 @@ void PairSolver::begin_anew(const Job& job, PairResult& out) {
 }
 
 /// Polar patches from where `find_patches` begins. @return false where the rule does not fit
-bool PairSolver::rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out) {
-  if (!patches_.solve(job, out)) return false;
+bool PairSolver::rings(const Job& job, double error, PairResult& out) {
+  PolarJob polar = job.polar;
+  polar.settings.error = error;
+  PairPressure& pressure = polar.pressure;
+  if (!patches_.solve(polar, out)) return false;
   // Faces that are nearly parallel are slow to tell where they are nearest: their overlap need not hold the seed. Obstacles without samples of their own
   // may be thin, and have a field only near them.
-  const auto shown_by_seeds = [&](int side) { return job.pressure.body(side).skeleton != nullptr || job.pressure.field(side).convex(); };
-  if (!patches_.empty() || (!convex && shown_by_seeds(0) && shown_by_seeds(1))) return true;
+  const auto shown_by_seeds = [&](int side) { return pressure.body(side).skeleton != nullptr || pressure.field(side).convex(); };
+  if (!patches_.empty() || (!job.convex && shown_by_seeds(0) && shown_by_seeds(1))) return true;
   std::optional<Between> between;
-  if (convex) between = between_cores(job.pressure.body(0), job.pressure.body(1), overlap, kManySteps);
+  if (job.convex) between = between_cores(pressure.body(0), pressure.body(1), job.overlap, kManySteps);
   if (between && between->apart) return true;
-  patches_.start_from(overlap, job.pressure);
-  if (!patches_.solve(job, out)) return false;
+  patches_.start_from(job.overlap, pressure);
+  if (!patches_.solve(polar, out)) return false;
   if (!patches_.empty() || !between || !between->overlap) return true;
-  patches_.start_from(between->middle, job.pressure);
-  return patches_.solve(job, out);
+  patches_.start_from(between->middle, pressure);
+  return patches_.solve(polar, out);
 }
 
 /// The same, at another error where the one asked for is not met. @return false where the rule does not fit
 bool PairSolver::polar(const Job& job, PairResult& out) {
   constexpr double kFiner = 0.1, kCoarse = 1e-3;
-  if (!rings(job.polar, job.overlap, job.convex, out)) {
+  const double error = job.settings().error;
+  if (!rings(job, error, out)) {
     // Where rings are lost at a fine error, coarse ones are better than nothing: other rules may not find so thin an overlap.
-    if (!job.convex || job.settings().error >= kCoarse) return false;
+    if (!job.convex || error >= kCoarse) return false;
     out.clear();
-    PolarJob coarse = job.polar;
-    coarse.settings.error = kCoarse;
-    return rings(coarse, job.overlap, job.convex, out);
+    return rings(job, kCoarse, out);
   }
-  if (patches_.empty() || meets(out, job.settings().error)) return true;
+  if (patches_.empty() || meets(out, error)) return true;
   // Rims and rounding may add a little to what panels are held to, and several patches are off by more than each of them: finer ones cost far
   // less than another rule.
   out.clear();
-  PolarJob finer = job.polar;
-  finer.settings.error *= kFiner;
-  if (rings(finer, job.overlap, job.convex, out) && meets(out, job.settings().error)) return true;
+  if (rings(job, kFiner * error, out) && meets(out, error)) return true;
   out.clear();
-  return rings(job.polar, job.overlap, job.convex, out);
+  return rings(job, error, out);
 }
 
 /// Polar patches again, parted about their imprints, and cut where `third_bodies_` press harder. @return false where the rule does not fit
@@ -321,7 +322,7 @@ bool PairSolver::stars_cut(const Job& job, double asked, PairResult& out) {
   out.clear();
   PairPressure& pressure = job.polar.pressure;
   share_.clear();
-  take_third_levels(job, third_bodies_);
+  take_third_levels(job);
   const std::span<const PolarCover> covers = patches_.covers();
   const double error = covers.size() > 1 ? kFiner * asked : asked;
   for (const PolarCover& cover : covers) {
@@ -394,7 +395,7 @@ struct PanelRule {
 };
 
 bool PairSolver::panels(const Job& job, PairResult& out) {
-  if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return false;
+  if (!is_finite(job.overlap)) return false;
   PairPressure& pressure = job.polar.pressure;
   std::vector<Vec3> starts(job.seeds.begin(), job.seeds.end());
   if (starts.empty()) {
@@ -403,7 +404,7 @@ bool PairSolver::panels(const Job& job, PairResult& out) {
   }
   PanelRule rule;
   return solve_in_order(job, rule, ContactRule::Panels, [&](const Regions& regions, const Vec3& reference) {
-    take_third_levels(job, third_bodies_);
+    take_third_levels(job);
     const bool fits = solve_by_panels({pressure, third_levels_, job.overlap, starts, job.settings().error, regions, reference, job.settings().energy, job.settings().only == ContactRule::None}, panel_room_, out.points, rule.outcome);
     for (const std::size_t side : {0u, 1u}) out.points.unsure[side] = out.points.unsure[side] || rule.outcome.thirds;
     return fits;
@@ -422,9 +423,8 @@ bool PairSolver::march_instead(const Job& job, PairResult& out) {
 /// Whether polar patches would be many, or crossed by many kinks, so that panels cost less.
 bool PairSolver::suits_panels(const Job& job) const {
   constexpr std::size_t kFewHills = 3, kManyPrimitives = 16;
-  constexpr double kWide = 2.0;     // overlaps, in features of the bodies
-  constexpr double kFinest = 1e-4;  // error: below, panels may miss slivers of that size between their nodes
-  if (job.settings().error < kFinest) return false;
+  constexpr double kWide = 2.0;  // overlaps, in features of the bodies
+  if (job.settings().error < kFinestPanels) return false;
   const auto many = [](const ContactBody& body) { return body.skeleton != nullptr && body.skeleton->primitive.size() >= kManyPrimitives; };
   if (!many(job.a) && !many(job.b)) return false;
   return patches_.hills() > kFewHills || job.polar.extent > kWide * job.polar.pressure.feature_size();
@@ -452,7 +452,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   }
   bool fits = (any || only == ContactRule::Polar) && polar(job, out);
   // Bodies that overlap where rings find no Sigma lie in each other, or one is so thin that Sigma is far from where rings begin.
-  const bool may_be_missed = any && patches_.empty() && out.rounding <= kLostInRounding && job.overlap.lower.allFinite() && job.overlap.upper.allFinite() &&
+  const bool may_be_missed = any && patches_.empty() && out.rounding <= kLostInRounding && is_finite(job.overlap) &&
                              (patches_.knows_overlap(job.polar.pressure) || may_lie_within(job, 0) || may_lie_within(job, 1)) &&
                              march_.may_meet(job.polar.pressure, job.overlap);
   fits = fits && !may_be_missed;
@@ -527,11 +527,9 @@ void PairSolver::fill_beyond_thirds(const Job& job, PairResult& out) {
 bool PairSolver::may_lie_within(const Job& job, int side) {
   const ContactBody& inner = side == 0 ? job.a : job.b;
   const auto presses_less = [&](const Vec3& place) -> std::optional<bool> {  // none: it has no pressure there
-    std::array<double, 2> at{};
-    job.polar.pressure.evaluate(side, {&place, 1}, {at.data(), 1});
-    if (!(at[0] > 0.0)) return std::nullopt;
-    job.polar.pressure.evaluate(1 - side, {&place, 1}, {&at[1], 1});
-    return at[0] < at[1];
+    const double own = job.polar.pressure.value(side, place);
+    if (!(own > 0.0)) return std::nullopt;
+    return own < job.polar.pressure.value(1 - side, place);
   };
   if (inner.skeleton == nullptr) return presses_less(inner.field.surface_box().centre()).value_or(false);
   for (const implicit::Primitive& p : inner.skeleton->primitive) {
@@ -548,8 +546,8 @@ bool PairSolver::may_lie_within(const Job& job, int side) {
 /// @param equal  both press alike everywhere   @param softer  the side that is known to press less everywhere
 void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> softer, PairResult& out) {
   PairPressure& pressure = job.polar.pressure;
-  if (out.summary.largest_pressure > std::numeric_limits<double>::epsilon() * pressure.largest_modulus()) return;
-  if (!job.overlap.lower.allFinite() || !job.overlap.upper.allFinite()) return;
+  if (out.summary.largest_pressure > kEpsilon * pressure.largest_modulus()) return;
+  if (!is_finite(job.overlap)) return;
   const int leading = leads(job.a, job.b) ? 0 : 1;
   for (const int side : {leading, 1 - leading}) {
     if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None || !(equal || (softer ? *softer == side : may_lie_within(job, side)))) continue;
@@ -563,13 +561,13 @@ void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> soft
 }
 
 /// Where patches are looked for first.
-void PairSolver::find_patches(const Job& job, std::span<const Vec3> seeds) {
+void PairSolver::find_patches(const Job& job) {
   if (job.convex) {
-    patches_.start_from(seeds.front(), job.polar.pressure);
-  } else if (seeds.empty()) {
+    patches_.start_from(job.seeds.front(), job.polar.pressure);
+  } else if (job.seeds.empty()) {
     patches_.start_from(job.overlap, job.polar.pressure);
   } else {
-    patches_.start_from(seeds, job.polar.spacing, job.polar.pressure);
+    patches_.start_from(job.seeds, job.polar.spacing, job.polar.pressure);
   }
 }
 
@@ -591,7 +589,7 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
   const double spacing = candidates.spacing.size() == candidates.pair.size() ? candidates.spacing[k] : 0.0;
   const bool convex = !several && candidates.convex.size() == candidates.pair.size() && candidates.convex[k] != 0;
   const double diagonal = overlap.extent().norm();
-  double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : std::numeric_limits<double>::infinity();
+  double extent = std::isfinite(diagonal) && diagonal > 0.0 ? diagonal : kInfinity;
   // Boxes that just touch have no extent across, but a patch that is as wide as the samples are apart may be there.
   extent = std::max(extent, convex ? pressure.feature_size() : 2.0 * spacing);
   if (!std::isfinite(extent)) extent = 4.0 * pressure.feature_size();
@@ -599,14 +597,14 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
 
   const Region least = settings.energy ? Region::Sums : Region::None;
   Job job{bodies, boxes, overlap, seeds, pair, a, b, {pressure, settings, {}, extent, spacing, {}, false, {}}, convex};
-  find_thirds(job, pair, partners);
+  find_thirds(job, partners);
   job.polar.regions = {a.pose.size() > 1 ? Region::Points : least, b.pose.size() > 1 ? Region::Points : least};
   if (settings.symmetry && convex) job.polar.axis = axis_of(a, b, seeds.front());
-  job.polar.faces = convex && !job.polar.axis && overlap.lower.allFinite() && overlap.upper.allFinite();
+  job.polar.faces = convex && !job.polar.axis && is_finite(overlap);
   const bool equal = coincide(a, b);
   const std::optional<int> softer = equal ? std::nullopt : softer_of_nested_balls(a, b);
   if (!equal && !softer) {
-    find_patches(job, seeds);
+    find_patches(job);
     choose(job, out);
     fill_unsure_regions(job, out);
   }

@@ -57,13 +57,13 @@ class PairSolver {
   };
 
   bool join_team(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const Partners& partners, const BodyPair& pair);
-  void find_thirds(const Job& job, const BodyPair& pair, const Partners& partners);
+  void find_thirds(const Job& job, const Partners& partners);
   /// Of third bodies on the patches of a pair: nowhere near as hard, or harder on some of them, or all over.
   enum class Pressing : std::uint8_t { None, Some, All };
   Pressing thirds_press(const Job& job, const PairResult& out);
   bool thirds_press_beside(const Job& job, const PairResult& out);
-  void find_patches(const Job& job, std::span<const Vec3> seeds);
-  bool rings(const PolarJob& job, const Box& overlap, bool convex, PairResult& out);
+  void find_patches(const Job& job);
+  bool rings(const Job& job, double error, PairResult& out);
   bool polar(const Job& job, PairResult& out);
   bool imprints_cut(const Job& job, PairResult& out);
   bool stars_cut(const Job& job, double asked, PairResult& out);
@@ -76,7 +76,7 @@ class PairSolver {
   [[nodiscard]] bool suits_panels(const Job& job) const;
   void choose(const Job& job, PairResult& out);
   void take_all_thirds(const Job& job);
-  void take_third_levels(const Job& job, std::span<const ContactBody* const> taken);
+  void take_third_levels(const Job& job);
   void begin_anew(const Job& job, PairResult& out);
   static double region_error(const ContactSettings& settings);
   void fill_unsure_regions(const Job& job, PairResult& out);

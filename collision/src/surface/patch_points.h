@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <utility>
 #include <vector>
 
+#include "numbers.h"
 #include "supple/core/types.h"
 
 namespace supple::collision {
@@ -65,7 +65,7 @@ inline double relative_difference(const PatchSums& fine, const PatchSums& coarse
 
 /// Round-off of coordinates [m] in the place of a surface, over how deep bodies overlap [m].
 inline double rounding_error(double coordinates, double thickness) {
-  return 16.0 * std::numeric_limits<double>::epsilon() * (1.0 + coordinates / thickness);
+  return 16.0 * kEpsilon * (1.0 + coordinates / thickness);
 }
 
 /// More of it than this, and no rule tells more than rings do, if they do.

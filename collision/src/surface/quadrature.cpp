@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "numbers.h"
 #include "supple/core/error.h"
 #include "supple/core/math.h"
 
@@ -91,13 +92,13 @@ std::vector<PolarRule> make_polar(bool single_ray) {
     PolarRule rule{.radial = size[0], .angular = single_ray ? 1 : size[1], .column = size[2], .cosine = {}, .sine = {},
                    .from_coarser = {}};
     for (int k = 0; k < rule.angular; ++k) {
-      const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * k / rule.angular);
+      const auto [s, c] = math::sin_cos(kTurn * k / rule.angular);
       rule.cosine.push_back(c);
       rule.sine.push_back(s);
       if (rules.empty()) continue;
       const int coarse = rules.back().angular;
       for (int j = 0; j < coarse; ++j) {
-        const double x = 2.0 * std::numbers::pi * (static_cast<double>(k) / rule.angular - static_cast<double>(j) / coarse);
+        const double x = kTurn * (static_cast<double>(k) / rule.angular - static_cast<double>(j) / coarse);
         rule.from_coarser.push_back(cardinal(coarse, x));
       }
     }
@@ -110,7 +111,7 @@ CurveAngles make_curve_angles(const PolarRule& rule) {
   CurveAngles angles;
   const auto n = static_cast<std::size_t>(rule.angular);
   for (std::size_t i = 0; i < 4 * n; ++i) {
-    const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * (0.25 * static_cast<double>(i)) / static_cast<double>(n));
+    const auto [s, c] = math::sin_cos(kTurn * (0.25 * static_cast<double>(i)) / static_cast<double>(n));
     angles.cosine.push_back(c);
     angles.sine.push_back(s);
   }

@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "numbers.h"
 #include "pairs/body_order.h"
+#include "pairs/boxes.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kAlike = 1e-7;        // over a size: distances that differ less are the same; those of meshes are kept to this share of a few cells
 constexpr double kAlikeSlopes = 0.02;  // over their sum: where slopes differ more, surfaces only cross
 constexpr double kNear = 0.01;         // of the step, outside the rival: rims are off by less
@@ -32,12 +32,12 @@ Comparison compare(const ContactBody& one, const ContactBody& other, const impli
   found.alike = found.step = kInfinity;
   const Box box = met.surface_box(), box_one = one.field.surface_box(), box_other = other.field.surface_box();
   const Box common{box.lower.cwiseMax(box_one.lower).cwiseMax(box_other.lower), box.upper.cwiseMin(box_one.upper).cwiseMin(box_other.upper)};
-  if (common.empty() || !common.lower.allFinite() || !common.upper.allFinite()) return found;
+  if (common.empty() || !is_finite(common)) return found;
   const double steepest = std::max(one.material.modulus * one.field.gradient_bound(common), other.material.modulus * other.field.gradient_bound(common));
   const double size = std::min({met.feature_size(), one.field.feature_size(), other.field.feature_size()});
   const double farthest = common.lower.cwiseAbs().cwiseMax(common.upper.cwiseAbs()).maxCoeff();
   found.step = steepest * size;
-  found.alike = steepest * (kAlike * size + 16.0 * std::numeric_limits<double>::epsilon() * farthest);
+  found.alike = steepest * (kAlike * size + 16.0 * kEpsilon * farthest);
   thread_local std::vector<Vec3> place;
   thread_local std::vector<double> value, value_other;
   place.clear();

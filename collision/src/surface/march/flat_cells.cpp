@@ -9,7 +9,7 @@ namespace {
 /// Unit normals of one body's surface within the other, from where Newton's method leads on a grid of the overlap.
 std::vector<Vec3> normals_within(PairPressure& pressure, int side, const Box& overlap) {
   constexpr int kPlaces = 5, kSteps = 12;
-  constexpr double kOnSurface = 1e-6;  // of the modulus
+  constexpr double kMet = 1e-6;  // of the modulus
   const Vec3 extent = overlap.extent();
   const double longest = 0.5 * extent.norm();
   std::vector<Vec3> at;
@@ -35,7 +35,7 @@ std::vector<Vec3> normals_within(PairPressure& pressure, int side, const Box& ov
   pressure.evaluate(1 - side, at, other);
   std::vector<Vec3> normal;
   for (std::size_t i = 0; i < at.size(); ++i) {
-    if (other[i] > 0.0 && std::abs(value[i]) <= kOnSurface * pressure.modulus(side) && slope[i].squaredNorm() > 0.0) normal.push_back(-slope[i].normalized());
+    if (other[i] > 0.0 && std::abs(value[i]) <= kMet * pressure.modulus(side) && slope[i].squaredNorm() > 0.0) normal.push_back(-slope[i].normalized());
   }
   return normal;
 }

@@ -1,3 +1,4 @@
+#include "surface/accuracy.h"
 #include "surface/march/march_rule.h"
 
 #include <algorithm>
@@ -8,12 +9,6 @@
 #include "supple/core/interrupt.h"
 
 namespace supple::collision {
-namespace {
-
-constexpr double kLeastCosine = 0.2;  // between the interpolated normal and that of Sigma
-
-}  // namespace
-
 void MarchRuleSolver::Feet::clear() {
   triangle.clear();
   at.clear();
@@ -59,12 +54,11 @@ void MarchRuleSolver::find_tangents(Feet& feet, std::size_t i) const {
 /// Whether the image lies the same way round there as its triangle, and does not stand on end.
 bool MarchRuleSolver::upright(const Feet& feet, std::size_t i) const {
   const Vec3 normal = feet.batch.slope_b[i] - feet.batch.slope_a[i], way = along(feet.triangle[i], feet.at[i]);
-  return normal.dot(way) > kLeastCosine * normal.norm() * way.norm() && feet.along_s[i].cross(feet.along_t[i]).dot(normal) > 0.0;
+  return normal.dot(way) > kGraphCosine * normal.norm() * way.norm() && feet.along_s[i].cross(feet.along_t[i]).dot(normal) > 0.0;
 }
 
 /// Pressures at some feet, at their heights so far, and the tangents of the image there.
-void MarchRuleSolver::measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet,
-                              std::span<const std::size_t> which) {
+void MarchRuleSolver::measure(PairPressure& pressure, Thirds third, Feet& feet, std::span<const std::size_t> which) {
   heed_scope();  // a pair may take seconds
   for (const std::size_t i : which) feet.batch.point[i] = plane(feet.triangle[i], feet.at[i]) + feet.height[i] * along(feet.triangle[i], feet.at[i]);
   pressure.evaluate(feet.batch, which, some_);
@@ -115,11 +109,11 @@ void MarchRuleSolver::lift(Feet& feet, std::size_t i, double move) const {
 }
 
 /// Feet on Sigma by Newton's method in their heights.
-void MarchRuleSolver::place(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet) {
+void MarchRuleSolver::place(PairPressure& pressure, Thirds third, Feet& feet) {
   feet.make_room();
   open_.resize(feet.size());
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  for (int step = 0; step < kNewtonSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
     measure(pressure, third, feet, open_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {

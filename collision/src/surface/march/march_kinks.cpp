@@ -3,12 +3,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "numbers.h"
+#include "surface/accuracy.h"
 #include "surface/march/march_rule.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kMildError = 1e-4;  // asked for, from which on kinks of the third derivative are left uncut
 constexpr double kReach = 1.1;       // of the feet of a piece, that its image may extend to
 
 }  // namespace
@@ -56,7 +57,7 @@ void MarchRuleSolver::find_crossings(const PairPressure& pressure, std::size_t f
           s[0], s[1], s[2], 2.0 * s[3] - 0.5 * (s[1] + s[2]), 2.0 * s[4] - 0.5 * (s[2] + s[0]), 2.0 * s[5] - 0.5 * (s[0] + s[1])};
       const auto [least, most] = std::minmax_element(control.begin(), control.end());
       if (*least > 0.0 || *most < 0.0) continue;
-      if (kink.order > 2 && error >= kMildError) {
+      if (is_mild(kink, error)) {
         leaf.trust = Trust::Kinked;
         continue;
       }
@@ -75,7 +76,7 @@ void MarchRuleSolver::cross_kinks(Leaf& leaf) const {
   // Rates of s along the rays from corner i to j, linear over the leaf, are least at a corner.
   const auto least_rate = [&](std::size_t i, std::size_t j) {
     const std::size_t k = 3 - i - j;
-    double least = std::numeric_limits<double>::infinity();
+    double least = kInfinity;
     for (const Crossing& crossing : kinks) {
       const auto& s = crossing.side;
       const std::array<double, 3> rate{4.0 * s[3 + k] - 3.0 * s[i] - s[j], 3.0 * s[j] + s[i] - 4.0 * s[3 + k],
@@ -131,11 +132,9 @@ void MarchRuleSolver::add_cuts(const Ray& along, double low, double high, std::v
   }
 }
 
-/// Where kinks meet the rim in the leaves [first, end), if the polynomials through their feet say that they do: Newton's method in both
-/// parameters on Sigma.
-void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+/// Fills `corners_` and `feet_` with about where kinks meet the rim in the leaves [first, end), if the polynomials through their feet say that they do.
+void MarchRuleSolver::guess_corners(std::size_t first, std::size_t end) {
   constexpr int kLooks = 9;
-  constexpr double kMet = 1e-5, kFar = 0.02;  // of the piece; off Sigma, in cells
   corners_.clear();
   feet_.clear();
   for (std::size_t l = first; l < end; ++l) {
@@ -172,11 +171,16 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
       }
     }
   }
+}
+
+/// The same on Sigma, by Newton's method in both parameters.
+void MarchRuleSolver::find_corners(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end) {
+  constexpr double kMet = 1e-5;  // of the piece
+  guess_corners(first, end);
   feet_.make_room();
   open_.resize(corners_.size());
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  constexpr int kSteps = 10;
-  for (int step = 0; step < kSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kFreeSteps && !open_.empty(); ++step) {
     measure(pressure, third, feet_, open_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {
@@ -184,7 +188,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
       if (!std::isfinite(move)) continue;
       feet_.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
       if (std::abs(feet_.height[i]) > cell_) continue;
-      if (std::abs(move) > kFar * cell_) {
+      if (std::abs(move) > kFarOff * cell_) {
         open_[left++] = i;
         continue;
       }
@@ -193,8 +197,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
       Vec3 slope;
       const double s = kinks_[corners_[i].kink].value(feet_.batch.point[i], slope);
       const Vec2 rate(slope.dot(feet_.along_s[i]), slope.dot(feet_.along_t[i]));
-      const double whole = cross(here.slope, rate);
-      Vec2 way = Vec2(here.slope.y() * s - rate.y() * here.pressure, rate.x() * here.pressure - here.slope.x() * s) / whole;
+      Vec2 way = meeting_of(here.slope, -here.pressure, rate, -s);
       if (!way.allFinite()) continue;
       const double length = way.norm();
       if (length > size) way *= size / length;
@@ -208,7 +211,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, std::span<const Conta
 }
 
 /// Where the leaves [first, end) are parted across the rays: where the rim, and kinks, meet the edges that rays begin and end on.
-void MarchRuleSolver::find_breaks(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+void MarchRuleSolver::find_breaks(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end) {
   find_ends(pressure, third, first, end);
   cuts_.clear();
   for (std::size_t l = first; l < end; ++l) {
@@ -254,7 +257,7 @@ void MarchRuleSolver::find_breaks(PairPressure& pressure, std::span<const Contac
 }
 
 /// Where kinks cut the parts of the rays that press.
-void MarchRuleSolver::find_cuts(PairPressure& pressure, std::span<const ContactBody* const> third) {
+void MarchRuleSolver::find_cuts(PairPressure& pressure, Thirds third) {
   cuts_.clear();
   for (Ray& ray : rays_) {
     ray.first_cut = cuts_.size();

@@ -1,3 +1,4 @@
+#include "numbers.h"
 #include "surface/march/march_rule.h"
 
 #include <algorithm>
@@ -21,87 +22,94 @@ double MarchRuleSolver::height_at(const Piece& piece, const Vec2& at) {
   return quadratic(piece, at, [](const Foot& f) { return f.height; });
 }
 
-/// By the Bezier controls of the cubic polynomial with the values and slopes at the corners.
+MarchRuleSolver::Controls::Controls(const Piece& piece) {
+  const auto& c = piece.corner;
+  const auto see = [this](double control) {
+    lowest = std::min(lowest, control);
+    highest = std::max(highest, control);
+  };
+  for (std::size_t i = 0; i < 3; ++i) {
+    corner[i] = c[i].pressure;
+    see(corner[i]);
+    for (std::size_t j = 0; j < 3; ++j) {
+      if (i == j) continue;
+      edge[i][j] = c[i].pressure + c[i].slope.dot(c[j].at - c[i].at) / 3.0;
+      see(edge[i][j]);
+      inner += edge[i][j] / 4.0 - c[i].pressure / 12.0;
+    }
+  }
+  see(inner);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    const double middle = (c[j].pressure + 3.0 * (edge[j][k] + edge[k][j]) + c[k].pressure) / 8.0;
+    margin = std::max(margin, kMargin * std::abs(piece.middle[i].pressure - middle));
+  }
+}
+
+/// Whether the pressure only goes away from that of corner i along rays from there to corner `to`: differences of controls are those of its rate.
+bool MarchRuleSolver::Controls::steady(std::size_t i, std::size_t to, double sign) const {
+  const std::size_t other = 3 - i - to;
+  const std::array<double, 6> steps{edge[i][to] - corner[i], edge[to][i] - edge[i][to],     corner[to] - edge[to][i],
+                                    inner - edge[i][other],  edge[to][other] - inner, edge[other][to] - edge[other][i]};
+  return std::all_of(steps.begin(), steps.end(), [&](double step) { return sign * step < -margin; });
+}
+
+/// Or whether it bends one way along all of them: then it changes its sign once where it has two signs at their ends. Where it has one, as beyond the rim
+/// on the edge across, it keeps it if it bends away from zero, or else if it goes away from it where they begin.
+bool MarchRuleSolver::Controls::bends(std::size_t i, std::size_t to, double sign) const {
+  const std::size_t other = 3 - i - to;
+  const std::array<double, 3> bend{edge[to][i] - 2.0 * edge[i][to] + corner[i], corner[to] - 2.0 * edge[to][i] + edge[i][to],
+                                   edge[to][other] - 2.0 * inner + edge[i][other]};
+  if (std::all_of(bend.begin(), bend.end(), [&](double change) { return sign * change > margin; })) return true;
+  if (!std::all_of(bend.begin(), bend.end(), [&](double change) { return sign * change < -margin; })) return false;
+  const double ends = corner[i] / (corner[i] - corner[other]);
+  const double begin = edge[i][to] - corner[i], middle = inner - edge[i][other], end = edge[other][to] - edge[other][i];
+  const double last = (1.0 - ends) * middle + ends * end, here = (1.0 - ends) * ((1.0 - ends) * begin + ends * middle) + ends * last;
+  return sign * here < -margin && sign * last < -margin && sign * end < -margin;
+}
+
 MarchRuleSolver::Shape MarchRuleSolver::shape_of(const Piece& piece) const {
   const auto& c = piece.corner;
+  const Controls controls(piece);
+  const double margin = controls.margin;
   bool good = true;
   std::size_t positive = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     good = good && c[i].good && piece.middle[i].good;
     positive += c[i].pressure > 0.0 ? 1 : 0;
   }
-  std::array<std::array<double, 3>, 3> edge{};  // [i][j]: next to corner i on the way to j
-  double margin = 0.0, lowest = std::numeric_limits<double>::infinity(), highest = -lowest, sum = 0.0;
-  const auto see = [&](double control) {
-    lowest = std::min(lowest, control);
-    highest = std::max(highest, control);
-  };
-  for (std::size_t i = 0; i < 3; ++i) {
-    see(c[i].pressure);
-    for (std::size_t j = 0; j < 3; ++j) {
-      if (i == j) continue;
-      edge[i][j] = c[i].pressure + c[i].slope.dot(c[j].at - c[i].at) / 3.0;
-      see(edge[i][j]);
-      sum += edge[i][j] / 4.0 - c[i].pressure / 12.0;
-    }
-  }
-  see(sum);
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
-    const double middle = (c[j].pressure + 3.0 * (edge[j][k] + edge[k][j]) + c[k].pressure) / 8.0;
-    margin = std::max(margin, kMargin * std::abs(piece.middle[i].pressure - middle));
-  }
   Shape shape;
-  shape.most = std::max(highest + margin, 0.0);
+  shape.most = std::max(controls.highest + margin, 0.0);
   if (positive == 0) {
-    shape.certain = good && highest < -margin;
+    shape.certain = good && controls.highest < -margin;
     return shape;
   }
   if (positive == 3) {
     shape.part = Part::All;
-    shape.certain = good && lowest > margin;
+    shape.certain = good && controls.lowest > margin;
     return shape;
   }
   shape.part = positive == 1 ? Part::Corner : Part::AllButCorner;
   const double sign = positive == 1 ? 1.0 : -1.0;  // of the lone corner
-  std::size_t lone = 0;
-  while ((c[lone].pressure > 0.0) != (positive == 1)) ++lone;
-  const std::size_t i = lone;
+  std::size_t i = 0;
+  while ((c[i].pressure > 0.0) != (positive == 1)) ++i;
   std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
   // Rays run along the edge that crosses the rim more steeply.
   const Vec3 x = plane(piece.triangle, c[i].at);
   const auto fall = [&](std::size_t to) { return std::abs(c[i].pressure - c[to].pressure) / (plane(piece.triangle, c[to].at) - x).norm(); };
   if (fall(k) > fall(j)) std::swap(j, k);
-  const double inner = sum;
-  // Along the rays the pressure only goes away from that of the lone corner: differences of controls are those of its rate.
-  const auto steady = [&](std::size_t to, std::size_t other) {
-    const std::array<double, 6> steps{edge[i][to] - c[i].pressure, edge[to][i] - edge[i][to],     c[to].pressure - edge[to][i],
-                                      inner - edge[i][other],      edge[to][other] - inner, edge[other][to] - edge[other][i]};
-    return std::all_of(steps.begin(), steps.end(), [&](double step) { return sign * step < -margin; });
-  };
-  // Or it bends one way along all of them: then it changes its sign once where it has two signs at their ends. Where it has one, as beyond the rim on the
-  // edge across, it keeps it if it bends away from zero, or else if it goes away from it where they begin.
-  const auto bends = [&](std::size_t to, std::size_t other) {
-    const std::array<double, 3> bend{edge[to][i] - 2.0 * edge[i][to] + c[i].pressure, c[to].pressure - 2.0 * edge[to][i] + edge[i][to],
-                                     edge[to][other] - 2.0 * inner + edge[i][other]};
-    if (std::all_of(bend.begin(), bend.end(), [&](double change) { return sign * change > margin; })) return true;
-    if (!std::all_of(bend.begin(), bend.end(), [&](double change) { return sign * change < -margin; })) return false;
-    const double ends = c[i].pressure / (c[i].pressure - c[other].pressure);
-    const double begin = edge[i][to] - c[i].pressure, middle = inner - edge[i][other], end = edge[other][to] - edge[other][i];
-    const double last = (1.0 - ends) * middle + ends * end, here = (1.0 - ends) * ((1.0 - ends) * begin + ends * middle) + ends * last;
-    return sign * here < -margin && sign * last < -margin && sign * end < -margin;
-  };
-  const auto rays_certain = [&](std::size_t to, std::size_t other) { return steady(to, other) || bends(to, other); };
-  if (!rays_certain(j, k)) std::swap(j, k);
+  const auto rays_certain = [&](std::size_t to) { return controls.steady(i, to, sign) || controls.bends(i, to, sign); };
+  if (!rays_certain(j)) std::swap(j, k);
   shape.order = {i, j, k};
   // Controls along the edge across, from the lone corner: once they have changed sign, they stay so.
+  const auto& edge = controls.edge;
   const bool once = !(sign * edge[i][k] < 0.0 && sign * edge[k][i] > 0.0);
-  shape.certain = good && once && rays_certain(j, k) && sign * edge[j][k] < -margin && sign * edge[k][j] < -margin;
+  shape.certain = good && once && rays_certain(j) && sign * edge[j][k] < -margin && sign * edge[k][j] < -margin;
   return shape;
 }
 
 /// The triangles of the mesh as pieces. Vertices and middles of edges have the same image seen from every triangle, and are placed once.
-void MarchRuleSolver::begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces) {
+void MarchRuleSolver::begin(PairPressure& pressure, Thirds third, std::vector<Piece>& pieces) {
   constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   const std::array<Vec2, 6> at{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1), Vec2(0.5, 0.5), Vec2(0, 0.5), Vec2(0.5, 0)};
   const auto edge_of = [](const SigmaMesh::Triangle& triangle, std::size_t across) {
@@ -172,13 +180,11 @@ std::optional<double> MarchRuleSolver::turn(const Piece& piece, std::size_t acro
   return (static_cast<double>(best - look.begin()) + step) / kLooks;
 }
 
-/// Ends of edges of pieces become corners of smaller ones: four of each, or where `at_turns` and the pressure turns on edges, so that both rims of a narrow
-/// band cross it, as many as have a corner on its ridge and one rim each.
-void MarchRuleSolver::split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool at_turns,
-                            std::vector<Piece>& to) {
+/// Fills `turns_`: places of the edges of pieces where the pressure turns and has another sign than at both ends. @param any  else none is looked for
+void MarchRuleSolver::find_turns(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool any) {
   turns_.assign(from.size(), {});
   feet_.clear();
-  for (std::size_t p = 0; at_turns && p < from.size(); ++p) {
+  for (std::size_t p = 0; any && p < from.size(); ++p) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::optional<double> t = turn(from[p], k);
       if (!t) continue;
@@ -197,47 +203,56 @@ void MarchRuleSolver::split(PairPressure& pressure, std::span<const ContactBody*
       else turns_[p][k].reset();
     }
   }
+}
+
+/// The corners of the smaller ones of a piece, three each. @param turned  where the pressure turns on its edges
+void MarchRuleSolver::divide(const Piece& p, const std::array<std::optional<Foot>, 3>& turned, std::vector<std::array<Foot, 3>>& to) const {
+  const auto turns = std::count_if(turned.begin(), turned.end(), [](const auto& t) { return t.has_value(); });
+  if (turns == 0 || turns == 3) {
+    std::array<Foot, 3> middle = p.middle;
+    for (std::size_t k = 0; k < 3 && turns == 3; ++k) middle[k] = *turned[k];
+    for (std::size_t k = 0; k < 3; ++k) to.push_back({p.corner[k], middle[(k + 2) % 3], middle[(k + 1) % 3]});
+    to.push_back(middle);
+    return;
+  }
+  std::size_t i = 0;  // whose edges are both alike
+  while (turned[i].has_value() != (turns == 1)) ++i;
+  const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+  const Foot &a = p.corner[i], &b = p.corner[j], &c = p.corner[k];
+  if (turns == 1) {
+    to.push_back({a, b, *turned[i]});
+    to.push_back({a, *turned[i], c});
+    return;
+  }
+  const Foot &to_b = *turned[k], &to_c = *turned[j];
+  const auto length = [&](const Foot& s, const Foot& t) { return (plane(p.triangle, t.at) - plane(p.triangle, s.at)).norm(); };
+  to.push_back({a, to_b, to_c});
+  if (length(to_b, c) < length(to_c, b)) {
+    to.push_back({to_b, b, c});
+    to.push_back({to_b, c, to_c});
+  } else {
+    to.push_back({to_b, b, to_c});
+    to.push_back({to_c, b, c});
+  }
+}
+
+/// Ends of edges of pieces become corners of smaller ones: four of each, or where `at_turns` and the pressure turns on edges, so that both rims of a narrow
+/// band cross it, as many as have a corner on its ridge and one rim each.
+void MarchRuleSolver::split(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to) {
+  find_turns(pressure, third, from, at_turns);
   feet_.clear();
   const std::size_t first = to.size();
   for (std::size_t n = 0; n < from.size(); ++n) {
-    const Piece& p = from[n];
-    const auto add = [&](const Foot& a, const Foot& b, const Foot& c) {
-      Piece piece;
-      piece.triangle = p.triangle;
-      piece.corner = {a, b, c};
+    divided_.clear();
+    divide(from[n], turns_[n], divided_);
+    for (const std::array<Foot, 3>& corner : divided_) {
+      Piece& piece = to.emplace_back();
+      piece.triangle = from[n].triangle;
+      piece.corner = corner;
       for (std::size_t k = 0; k < 3; ++k) {
-        const Vec2 at = 0.5 * (piece.corner[(k + 1) % 3].at + piece.corner[(k + 2) % 3].at);
-        feet_.add(p.triangle, at, height_at(p, at));
+        const Vec2 at = 0.5 * (corner[(k + 1) % 3].at + corner[(k + 2) % 3].at);
+        feet_.add(piece.triangle, at, height_at(from[n], at));
       }
-      to.push_back(piece);
-    };
-    const auto& turned = turns_[n];
-    const auto turns = std::count_if(turned.begin(), turned.end(), [](const auto& t) { return t.has_value(); });
-    if (turns == 0 || turns == 3) {
-      std::array<Foot, 3> middle = p.middle;
-      for (std::size_t k = 0; k < 3 && turns == 3; ++k) middle[k] = *turned[k];
-      for (std::size_t k = 0; k < 3; ++k) add(p.corner[k], middle[(k + 2) % 3], middle[(k + 1) % 3]);
-      add(middle[0], middle[1], middle[2]);
-      continue;
-    }
-    std::size_t i = 0;  // whose edges are both alike
-    while (turned[i].has_value() != (turns == 1)) ++i;
-    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
-    const Foot &a = p.corner[i], &b = p.corner[j], &c = p.corner[k];
-    if (turns == 1) {
-      add(a, b, *turned[i]);
-      add(a, *turned[i], c);
-      continue;
-    }
-    const Foot &to_b = *turned[k], &to_c = *turned[j];
-    add(a, to_b, to_c);
-    const auto length = [&](const Foot& s, const Foot& t) { return (plane(p.triangle, t.at) - plane(p.triangle, s.at)).norm(); };
-    if (length(to_b, c) < length(to_c, b)) {
-      add(to_b, b, c);
-      add(to_b, c, to_c);
-    } else {
-      add(to_b, b, to_c);
-      add(to_c, b, c);
     }
   }
   place(pressure, third, feet_);
@@ -268,7 +283,7 @@ bool MarchRuleSolver::smooth(const Piece& piece) const {
 }
 
 /// Takes out pieces that certainly do not press, and splits those whose rim is in doubt until they are small; appends leaves.
-void MarchRuleSolver::settle(PairPressure& pressure, std::span<const ContactBody* const> third, double error, std::vector<Piece>& pieces) {
+void MarchRuleSolver::settle(PairPressure& pressure, Thirds third, double error, std::vector<Piece>& pieces) {
   double held = 0.0;  // area that presses, about
   for (const Leaf& leaf : leaves_) held += leaf.sums.area;
   const auto add = [&](const Piece& piece, const Shape& shape, double area) {

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
+#include "numbers.h"
+#include "pairs/boxes.h"
 #include "supple/core/interrupt.h"
+#include "surface/accuracy.h"
 #include "surface/march/flat_cells.h"
 #include "surface/quadrature.h"
 #include "surface/region/squeezed_region.h"
@@ -16,7 +18,6 @@ namespace {
 
 /// Of a cell: a last step as long as this leaves its square, and normals as good as it.
 constexpr double kOnSigma = 1e-9, kOnSigmaAtBest = 1e-12;
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr int kMostHalvings = 4;       // of the cells of a mesh at which something presses
 constexpr int kRoughHalvings = 1;      // the same, where an error of kRough or more is asked for
 constexpr double kRough = 5e-2;
@@ -24,12 +25,9 @@ constexpr double kBeside = 2.0;        // from where it presses, in triangles: o
 constexpr double kBesideEnd = 0.7;     // the same at the end of both supports; not beyond the cells that are there in every view
 constexpr double kSmallest = 1.0 / 512.0;  // cell, over the features, for small patches
 constexpr double kNoLess = 0.9;        // of Sigma: long cells see as much of it as cubes do
-constexpr double kSafety = 2.0;        // of the difference between two rules
-constexpr double kKept = 0.5;          // of the error asked for: what pieces that are not split may add up to
 constexpr double kShortest = 1e-9;     // piece of a ray
 constexpr int kFewNodes = 3;           // through a squeezed region
 constexpr double kWidest = 20.0;       // ends of columns, over where they begin
-constexpr int kMoreAcross = 2;         // columns out of an apex may go through most of the body
 constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
 
 int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
@@ -37,8 +35,7 @@ int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : err
 }  // namespace
 
 /// Where on the rays the rim lies, or a kink: Newton's method on Sigma, held between places on both sides of it.
-void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Ray>& rays) {
-  constexpr double kFar = 0.02;  // off Sigma, in cells: too far to move along it
+void MarchRuleSolver::find_zeros(PairPressure& pressure, Thirds third, std::vector<Ray>& rays) {
   constexpr double kNear = 1e-5;  // near enough to tell on which side of the rim
   constexpr double kMet = 1e-11, kAtZero = 1e-7;
   // The square of this is left of the way to a kink, and sums miss a higher power of it.
@@ -51,7 +48,7 @@ void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const Contact
   for (std::size_t i = 0; i < n; ++i) {
     if (rays[i].rim != Rim::None) open_.push_back(i);
   }
-  for (int step = 0; step < kNewtonSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
     measure(pressure, third, feet_, open_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {
@@ -61,7 +58,7 @@ void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const Contact
       feet_.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
       if (std::abs(feet_.height[i]) > cell_) continue;
       open_[left++] = i;
-      if (std::abs(move) > kFar * cell_) continue;
+      if (std::abs(move) > kFarOff * cell_) continue;
       lift(feet_, i, move);
       const Foot here = foot(feet_, i);
       const bool rim = ray.kink == kPressure;
@@ -90,7 +87,7 @@ void MarchRuleSolver::find_zeros(PairPressure& pressure, std::span<const Contact
 }
 
 /// Where the rim crosses the first edge of each leaf, from the lone corner to the next but one.
-void MarchRuleSolver::find_ends(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end) {
+void MarchRuleSolver::find_ends(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end) {
   rays_.clear();
   for (std::size_t l = first; l < end; ++l) {
     Leaf& leaf = leaves_[l];
@@ -208,8 +205,7 @@ MarchRuleSolver::Node MarchRuleSolver::node_at(std::size_t i) const {
 }
 
 /// Sums of the leaves from `first` on by rules of this order and of one less.
-void MarchRuleSolver::integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, double error,
-                                std::size_t first) {
+void MarchRuleSolver::integrate(PairPressure& pressure, Thirds third, const Vec3& reference, double error, std::size_t first) {
   const int order = order_for(error);
   for (; first < leaves_.size(); first += kBatch) {
     const std::size_t end = std::min(leaves_.size(), first + kBatch);
@@ -254,11 +250,11 @@ double MarchRuleSolver::share_of(const Leaf& leaf, int order) {
   constexpr double kFall = 30.0, kKinked = 4.0, kLost = 10.0;
   if (leaf.trust == Trust::Lost) return kLost;
   if (leaf.trust == Trust::Kinked) return kKinked;
-  if (!leaf.shape.certain || !(leaf.sums.load > 0.0) || !(leaf.sums.area > 0.0)) return kSafety;
+  if (!leaf.shape.certain || !(leaf.sums.load > 0.0) || !(leaf.sums.area > 0.0)) return kTwoOrders;
   const double off = std::max(leaf.off.force.norm() / leaf.sums.load, std::abs(leaf.off.area) / leaf.sums.area);
   double root = std::sqrt(off);  // of degree order - 1 at least
   for (int degree = 2; degree < order - 1; degree *= 2) root = std::sqrt(root);
-  return std::min(kSafety, kFall * root);
+  return std::min(kTwoOrders, kFall * root);
 }
 
 /// The sums over all leaves, and what each may be off by, relative to them.
@@ -268,7 +264,7 @@ void MarchRuleSolver::weigh(int order) {
   sums_ = {};
   for (const Leaf& leaf : leaves_) sums_.add(leaf.sums);
   estimate_ = 1.0;
-  unmet_ = std::numeric_limits<double>::infinity();
+  unmet_ = kInfinity;
   if (!(sums_.load > 0.0)) return;
   const double across = std::sqrt(sums_.area), force = force_scale(sums_.force, sums_.load);
   const Vec3 centre = sums_.centre();
@@ -289,7 +285,7 @@ void MarchRuleSolver::weigh(int order) {
 }
 
 /// Splits the leaves that err most until the rest is as good as asked. @return whether Sigma was met
-bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference) {
+bool MarchRuleSolver::refine(PairPressure& pressure, Thirds third, const Limits& limits, const Vec3& reference) {
   const int order = order_for(limits.error);
   leaves_.clear();
   nodes_.clear();
@@ -304,7 +300,7 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
     });
     double kept = 0.0;
     std::size_t keeps = 0;
-    while (keeps < order_.size() && kept + leaves_[order_[keeps]].error <= kKept * limits.error) kept += leaves_[order_[keeps++]].error;
+    while (keeps < order_.size() && kept + leaves_[order_[keeps]].error <= kOfKept * limits.error) kept += leaves_[order_[keeps++]].error;
     // All pieces that mirror one another, whose errors differ by round-off, are split, or none.
     constexpr double kAlike = 1.0 - 1e-6;
     while (keeps > 0 && keeps < order_.size() && leaves_[order_[keeps - 1]].error >= kAlike * leaves_[order_[keeps]].error) --keeps;
@@ -327,7 +323,7 @@ bool MarchRuleSolver::refine(PairPressure& pressure, std::span<const ContactBody
 
 /// Ways through what one body loses: out of its apex, or along the interpolated normals, which fill the space beside Sigma without gaps as far as
 /// they do not meet.
-void MarchRuleSolver::start_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, const Node& peak) {
+void MarchRuleSolver::start_columns(PairPressure& pressure, int side, Thirds third, const Node& peak) {
   const double sign = side == 0 ? 1.0 : -1.0;
   apex_ = find_apex(pressure, side, third, peak.point, sign * peak.normal);
   columns_.assign(nodes_.size(), {});
@@ -337,10 +333,10 @@ void MarchRuleSolver::start_columns(PairPressure& pressure, int side, std::span<
     if (apex_) {
       c.way = apex_->way(node.point);
       const double flux = sign * node.weight * node.normal.dot(c.way), bend = 1.0 / apex_->distance(node.point);
-      c.swept = {flux, 2.0 * bend * flux, bend * bend * flux};
+      c.swept = swept_out_of_apex(flux, bend);
     } else {
       c.way = sign * node.along;
-      c.swept = {node.swept[0], sign * node.swept[1], node.swept[2]};
+      c.swept = {{node.swept[0], sign * node.swept[1], node.swept[2]}};
     }
   }
 }
@@ -360,7 +356,7 @@ bool MarchRuleSolver::hold(PairPressure& pressure, int side) {
   place_.clear();
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const Column& c = columns_[i];
-    if (!(std::abs(c.width(c.at)) < kWidest * std::abs(c.width(0.0)))) return false;
+    if (!(std::abs(c.swept.width(c.at)) < kWidest * std::abs(c.swept.width(0.0)))) return false;
     place_.push_back(nodes_[i].point + c.at * c.way);
   }
   if (apex_) return true;
@@ -370,13 +366,12 @@ bool MarchRuleSolver::hold(PairPressure& pressure, int side) {
 }
 
 /// Gauss points in what one body loses, unless columns do not hold it.
-void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, double error, const Node& peak,
-                                  PatchPoints& points) {
+void MarchRuleSolver::add_columns(PairPressure& pressure, int side, Thirds third, double error, const Node& peak, PatchPoints& points) {
   start_columns(pressure, side, third, peak);
   const std::size_t n = nodes_.size();
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  for (int step = 0; step < kNewtonSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
     heed_scope();
     place_.clear();
     for (const std::size_t i : open_) place_.push_back(nodes_[i].point + columns_[i].at * columns_[i].way);
@@ -407,7 +402,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       const double t = c.at * gauss.node[j];
       points.volume_point.push_back(nodes_[i].point + t * c.way);
-      points.volume_weight.push_back(c.width(t) * c.at * gauss.weight[j]);
+      points.volume_weight.push_back(c.swept.width(t) * c.at * gauss.weight[j]);
     }
   }
   if (apex_ && apex_->lost) fill_body(pressure, side, apex_->at, error, points.volume_point, points.volume_weight);
@@ -415,7 +410,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, std::span<co
 }
 
 /// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press. @return whether there were not too many cells
-bool MarchRuleSolver::lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap,
+bool MarchRuleSolver::lay_mesh(PairPressure& pressure, Thirds third, const Box& overlap,
                                const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat, int most_halvings) {
   const auto mesh = [&] {
     heed_scope();
@@ -480,13 +475,13 @@ bool MarchRuleSolver::may_meet(const PairPressure& pressure, const Box& overlap)
 
 bool MarchRuleSolver::solve(const Job& job, PatchPoints& points) {
   PairPressure& pressure = job.pressure;
-  const std::span<const ContactBody* const> third = job.third;
+  const Thirds third = job.third;
   const Box& overlap = job.overlap;
   const Limits& limits = job.limits;
   estimate_ = 1.0;
   thickness_ = 0.0;
   points.clear();
-  if (overlap.empty() || !overlap.lower.allFinite() || !overlap.upper.allFinite() || !(overlap.extent().maxCoeff() > 0.0)) return false;
+  if (overlap.empty() || !is_finite(overlap) || !(overlap.extent().maxCoeff() > 0.0)) return false;
   const double coordinates = std::max(overlap.lower.cwiseAbs().maxCoeff(), overlap.upper.cwiseAbs().maxCoeff());
   kinks_.clear();
   all_kinks_ = pressure.kinks(overlap, kinks_);

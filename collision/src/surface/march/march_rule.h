@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "numbers.h"
 #include "surface/march/sigma_mesh.h"
 #include "surface/pair_pressure.h"
 #include "surface/patch_points.h"
@@ -25,7 +26,7 @@ class MarchRuleSolver {
   };
   struct Job {
     PairPressure& pressure;
-    std::span<const ContactBody* const> third;  ///< bodies whose larger pressure takes space away from the pair
+    Thirds third;  ///< bodies whose larger pressure takes space away from the pair
     Box overlap;
     Regions regions;  ///< what is wanted of the squeezed regions
     Vec3 reference;   ///< origin of the moments in `sums`
@@ -47,9 +48,7 @@ class MarchRuleSolver {
   static constexpr std::size_t kMostPieces = 1u << 15;
 
  private:
-  using Vec2 = Eigen::Vector2d;
-  static constexpr int kNewtonSteps = 30;
-  static double cross(const Vec2& p, const Vec2& q) { return p.x() * q.y() - p.y() * q.x(); }
+  static constexpr double kFarOff = 0.02;  ///< off Sigma, in cells: too far to move along it
   /// A place of a triangle's image.
   struct Foot {
     Vec2 at = Vec2::Zero();     // (s, t): corners of the triangle are (0, 0), (1, 0), (0, 1)
@@ -119,9 +118,8 @@ class MarchRuleSolver {
   /// How far a squeezed region reaches along a node's way, between places on both sides of its end, and the area across it over that distance.
   struct Column {
     Vec3 way = Vec3::Zero();
-    std::array<double, 3> swept{};  // a polynomial
-    double at = 0.0, low = 0.0, high = std::numeric_limits<double>::infinity();
-    [[nodiscard]] double width(double t) const { return swept[0] + t * (swept[1] + t * swept[2]); }
+    Swept swept{};
+    double at = 0.0, low = 0.0, high = kInfinity;
   };
   /// A kink that may cross a leaf, by its s at the corners and at the middles of the edges.
   struct Crossing {
@@ -155,8 +153,8 @@ class MarchRuleSolver {
 
   void find_tangents(Feet& feet, std::size_t i) const;
   [[nodiscard]] bool upright(const Feet& feet, std::size_t i) const;
-  void measure(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet, std::span<const std::size_t> which);
-  void place(PairPressure& pressure, std::span<const ContactBody* const> third, Feet& feet);
+  void measure(PairPressure& pressure, Thirds third, Feet& feet, std::span<const std::size_t> which);
+  void place(PairPressure& pressure, Thirds third, Feet& feet);
   [[nodiscard]] double to_sigma(const Feet& feet, std::size_t i) const;
   void lift(Feet& feet, std::size_t i, double move) const;
   [[nodiscard]] Vec3 plane(std::uint32_t triangle, const Vec2& at) const;
@@ -172,38 +170,51 @@ class MarchRuleSolver {
     for (std::size_t k = 0; k < 3; ++k) sum += weight[k] * of(piece.corner[k]) + weight[3 + k] * of(piece.middle[k]);
     return sum;
   }
+  /// Bezier controls of the cubic polynomial with the values and slopes of the pressure at the corners of a piece, and by how much it may miss the pressure.
+  /// Rays run from corner i towards another one; `sign` is that of the pressure at i.
+  struct Controls {
+    std::array<double, 3> corner{};
+    std::array<std::array<double, 3>, 3> edge{};  // [i][j]: next to corner i on the way to j
+    double inner = 0.0, margin = 0.0, lowest = kInfinity, highest = -kInfinity;
+    explicit Controls(const Piece& piece);
+    [[nodiscard]] bool steady(std::size_t i, std::size_t to, double sign) const;
+    [[nodiscard]] bool bends(std::size_t i, std::size_t to, double sign) const;
+  };
   [[nodiscard]] Shape shape_of(const Piece& piece) const;
   [[nodiscard]] bool smooth(const Piece& piece) const;
   [[nodiscard]] bool may_press(const PairPressure& pressure, const Piece& piece) const;
-  bool lay_mesh(PairPressure& pressure, std::span<const ContactBody* const> third, const Box& overlap, const std::optional<CommonAxis>& axis,
+  bool lay_mesh(PairPressure& pressure, Thirds third, const Box& overlap, const std::optional<CommonAxis>& axis,
                 const std::optional<FlatCells>& flat, int most_halvings);
-  void begin(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Piece>& pieces);
+  void begin(PairPressure& pressure, Thirds third, std::vector<Piece>& pieces);
   static std::optional<double> turn(const Piece& piece, std::size_t across);
-  void split(PairPressure& pressure, std::span<const ContactBody* const> third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to);
-  void settle(PairPressure& pressure, std::span<const ContactBody* const> third, double error, std::vector<Piece>& pieces);
+  void find_turns(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool any);
+  void divide(const Piece& p, const std::array<std::optional<Foot>, 3>& turned, std::vector<std::array<Foot, 3>>& to) const;
+  void split(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool at_turns, std::vector<Piece>& to);
+  void settle(PairPressure& pressure, Thirds third, double error, std::vector<Piece>& pieces);
   void guess(Ray& ray) const;
   static double height_at(const Piece& piece, const Vec2& at);
   static std::array<double, 6> weights(const Piece& piece, const Vec2& at);
   void cross_kinks(Leaf& leaf) const;
   void find_crossings(const PairPressure& pressure, std::size_t first, std::size_t end, double error);
   void add_cuts(const Ray& along, double low, double high, std::vector<Ray>& cuts) const;
-  void find_corners(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
-  void find_breaks(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
-  void find_cuts(PairPressure& pressure, std::span<const ContactBody* const> third);
+  void guess_corners(std::size_t first, std::size_t end);
+  void find_corners(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end);
+  void find_breaks(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end);
+  void find_cuts(PairPressure& pressure, Thirds third);
   bool sides_agree(const Leaf& leaf, std::size_t first_ray, std::size_t end_ray, std::size_t foot);
-  void find_ends(PairPressure& pressure, std::span<const ContactBody* const> third, std::size_t first, std::size_t end);
+  void find_ends(PairPressure& pressure, Thirds third, std::size_t first, std::size_t end);
   void send_rays(std::size_t first, std::size_t end, int order);
-  void find_zeros(PairPressure& pressure, std::span<const ContactBody* const> third, std::vector<Ray>& rays);
+  void find_zeros(PairPressure& pressure, Thirds third, std::vector<Ray>& rays);
   void lay_points();
   [[nodiscard]] Node node_at(std::size_t i) const;
-  void integrate(PairPressure& pressure, std::span<const ContactBody* const> third, const Vec3& reference, double error, std::size_t first);
+  void integrate(PairPressure& pressure, Thirds third, const Vec3& reference, double error, std::size_t first);
   static double share_of(const Leaf& leaf, int order);
   void weigh(int order);
-  bool refine(PairPressure& pressure, std::span<const ContactBody* const> third, const Limits& limits, const Vec3& reference);
-  void start_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, const Node& peak);
+  bool refine(PairPressure& pressure, Thirds third, const Limits& limits, const Vec3& reference);
+  void start_columns(PairPressure& pressure, int side, Thirds third, const Node& peak);
   [[nodiscard]] bool lead_out() const;
   bool hold(PairPressure& pressure, int side);
-  void add_columns(PairPressure& pressure, int side, std::span<const ContactBody* const> third, double error, const Node& peak, PatchPoints& points);
+  void add_columns(PairPressure& pressure, int side, Thirds third, double error, const Node& peak, PatchPoints& points);
 
   SigmaMesher mesher_;
   SigmaMesh mesh_;
@@ -218,6 +229,7 @@ class MarchRuleSolver {
   std::vector<std::uint8_t> rough_;   // triangles of long cells, or of too many, that are not smooth: between their corners Sigma may turn
   std::vector<std::size_t> spots_;    // of its triangles: six feet each
   std::vector<Piece> pieces_, halves_, doubtful_;
+  std::vector<std::array<Foot, 3>> divided_;
   std::vector<std::array<std::optional<Foot>, 3>> turns_;  // on the edges across from the corners of pieces that are split
   std::vector<Leaf> leaves_;
   std::vector<implicit::Kink> kinks_, known_;  // of the overlap, of a leaf

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "numbers.h"
 #include "pairs/body_order.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
@@ -33,7 +34,7 @@ Place place_of(Key key) {
 /// Pressure [Pa] of a body outside the support of its field; minus infinity where there is none.
 double outside_support(const PairPressure& pressure, int side) {
   const implicit::FieldView& field = pressure.field(side);
-  if (field.as_field() == nullptr) return -std::numeric_limits<double>::infinity();
+  if (field.as_field() == nullptr) return -kInfinity;
   const Box box = field.surface_box();
   return pressure.modulus(side) * field.value(box.upper + kFar * (box.extent() + Vec3::Constant(field.feature_size())));
 }
@@ -197,8 +198,7 @@ void SigmaMesher::place_vertices(PairPressure& pressure, SigmaMesh& out) {
   }
   open_.resize(n);
   for (std::size_t i = 0; i < n; ++i) open_[i] = i;
-  constexpr int kSteps = 30;
-  for (int step = 0; step < kSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
     pressure.evaluate(vertex_, open_, some_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "numbers.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
@@ -10,7 +12,7 @@ namespace {
 /// Where the ends of a line meet each other or a side of the panel, on the way to the other line. @return the nearest such place to it
 std::optional<double> meeting(const LineShape& from, double to, double low, double high) {
   const double gap = to - from.at;
-  double least = std::numeric_limits<double>::infinity();
+  double least = kInfinity;
   const auto after = [&](double distance, double speed) {  // speed: at which the distance falls, over that between the lines
     const double way = distance / speed;
     if (way / gap > 0.0 && way / gap < 1.0) least = std::min(least, way / gap);
@@ -42,7 +44,6 @@ double drift_of(const LineShape& line) {
 std::optional<PanelCorner> corner_between(const LineShape& one, const LineShape& other, double low, double high) {
   const auto alike = [](const LineEnd& p, const LineEnd& q) { return p.level == q.level; };
   if (std::equal(one.ends.begin(), one.ends.end(), other.ends.begin(), other.ends.end(), alike)) return std::nullopt;
-  constexpr double kOfRectangle = 0.125;
   const double gap = other.at - one.at;
   const std::optional<double> up = meeting(one, other.at, low, high), down = meeting(other, one.at, low, high);
   // The nearer it is to the line that tells, the better it is known.

@@ -1,8 +1,9 @@
 /// What the panels of a pass may hold beside what their lines tell, and where they would be split for it.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "numbers.h"
+#include "surface/accuracy.h"
 #include "surface/panels/panel_pass.h"
 
 namespace supple::collision::panel_pass {
@@ -77,7 +78,7 @@ void Pass::look_aside(Panel& panel, std::size_t k, std::size_t in, bool upper, d
 
 /// What may press between nodes that do not: where the pressure is concave along Sigma, it lies below all its tangents.
 void Pass::look_between(Panel& panel, std::size_t k, double most) const {
-  double below = std::numeric_limits<double>::infinity(), least = 0.0;
+  double below = kInfinity, least = 0.0;
   const Plane middle{low_of(panel, 0) + 0.5 * width_of(panel, 0), low_of(panel, 1) + 0.5 * width_of(panel, 1)};
   for (std::size_t i = 0; i < n_ * n_; ++i) {
     const Node ray = node(k, i);
@@ -264,7 +265,6 @@ bool Pass::judge_slots(std::size_t k, double& most) {
   (void)predict_roots(a_.sample, low, high, a_.root);
   double steepest = 0.0;  // of the pressure, along lines
   for (std::size_t i = 0; i < n_ * n_; ++i) steepest = std::max(steepest, std::abs(s_.chart.slopes(a_.ray[k * n_ * n_ + i].place, a_.ray[k * n_ * n_ + i].slope)[panel.inner]));
-  constexpr double kOfRectangle = 0.125;
   for (std::size_t r = 0; r < a_.root.size(); ++r) {
     const double at = a_.root[r].guess;
     std::size_t j = 0;

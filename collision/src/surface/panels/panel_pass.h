@@ -14,9 +14,6 @@
 
 namespace supple::collision::panel_pass {
 
-/// Least cosine between Sigma's normal and the rays that see it.
-inline constexpr double kLeastCosine = 0.3;
-
 using Plane = std::array<double, 2>;
 
 inline std::size_t across(const Panel& panel, std::size_t k) { return static_cast<std::size_t>(k == 0 ? first_across(panel.along) : second_across(panel.along)); }

@@ -3,18 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
+#include "numbers.h"
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kLeastCosine = 0.3;  // between the normals of a graph and its rays
 constexpr std::size_t kMostPanels = 4096, kMostOfStar = 512;
 constexpr int kMostDepth = 24;
-constexpr double kSafety = 2.0;               // of estimates: two orders may both miss something
 
 /// What panels are held to: force, area, and first moment of the load about its centre.
 struct Errors {
@@ -101,15 +100,7 @@ class PanelSolver {
 void PanelSolver::move_to_sigma(PressureBatch& batch) const {
   constexpr int kSteps = 3;
   for (int step = 0; step < kSteps; ++step) {
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      const Vec3 slope = batch.slope_a[i] - batch.slope_b[i];
-      const double square = slope.squaredNorm();
-      if (!(square > 0.0)) continue;
-      Vec3 move = ((batch.b[i] - batch.a[i]) / square) * slope;
-      const double length = move.norm();
-      if (length > setting_.view.reach) move *= setting_.view.reach / length;
-      batch.point[i] += move;
-    }
+    step_to_sigma(batch, setting_.view.reach);
     job_.pressure.evaluate(batch);
   }
 }
@@ -140,8 +131,7 @@ bool PanelSolver::frame_from(const PressureBatch& batch) {
   const auto weight = [&](std::size_t i) { return std::max(batch.a[i] / job_.pressure.modulus(0), 0.0) + std::max(batch.b[i] / job_.pressure.modulus(1), 0.0); };
   const auto across = [&](std::size_t i) { return Vec3((batch.slope_b[i] - batch.slope_a[i]).normalized()); };
   const auto presses = [&](std::size_t i) {
-    constexpr double kOutside = -1e-9;  // pressures over moduli; on a body's own samples its own is nothing but rounding
-    return batch.a[i] > kOutside * job_.pressure.modulus(0) && batch.b[i] > kOutside * job_.pressure.modulus(1) && weight(i) > 0.0;
+    return batch.a[i] > -kOnSurface * job_.pressure.modulus(0) && batch.b[i] > -kOnSurface * job_.pressure.modulus(1) && weight(i) > 0.0;
   };
   r_.start.clear();
   r_.start_pressure.clear();
@@ -160,7 +150,7 @@ bool PanelSolver::frame_from(const PressureBatch& batch) {
   if (!(all > 0.0)) return false;
   place /= all;
   const Vec3 axis = best_axis(normals, normal);
-  graph_ = least_cosine(normals, axis) > kLeastCosine;
+  graph_ = least_cosine(normals, axis) > kRayCosine;
   const Vec3 first = job_.pressure.tangent(place, axis).value_or(axis.unitOrthogonal());
   const Vec3 u = (first - first.dot(axis) * axis).normalized();
   setting_.view.frame = {place, {u, axis.cross(u), axis}};
@@ -185,7 +175,7 @@ bool PanelSolver::set_star(double margin) {
   setting_.chart.axis = {frame.u.norm(), frame.v.norm()};
   std::array<double, kAngles> reach{};
   for (std::size_t k = 0; k < kAngles; ++k) {
-    const auto [sine, cosine] = math::sin_cos(2.0 * std::numbers::pi * static_cast<double>(k) / kAngles);
+    const auto [sine, cosine] = math::sin_cos(kTurn * static_cast<double>(k) / kAngles);
     const double far = cover.reach({cosine, sine}).far;
     if (!(far > 0.0)) return false;
     reach[k] = margin / far;
@@ -216,7 +206,7 @@ void PanelSolver::start_star() {
   for (const Vec3& x : cover.rim) add(x);
   const double beside = (high - low) + std::max(cover.thickness, cover.frame.thickness);
   for (int k = 0; k < kSectors; ++k) {
-    constexpr double kWidth = 2.0 * std::numbers::pi / kSectors;
+    constexpr double kWidth = kTurn / kSectors;
     Panel panel;
     panel.low = {k * kWidth, 0.0, low - beside};
     panel.high = {(k + 1) * kWidth, 1.0, high + beside};
@@ -257,8 +247,8 @@ Box PanelSolver::box_of(const Panel& panel) const {
 void PanelSolver::start() {
   const RayFrame& frame = setting_.view.frame;
   std::array<double, 3> low, high, count;
-  low.fill(std::numeric_limits<double>::infinity());
-  high.fill(-std::numeric_limits<double>::infinity());
+  low.fill(kInfinity);
+  high.fill(-kInfinity);
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 pick((corner & 1) != 0 ? 1.0 : 0.0, (corner & 2) != 0 ? 1.0 : 0.0, (corner & 4) != 0 ? 1.0 : 0.0);
     const Vec3 y = frame.local(job_.overlap.lower + pick.cwiseProduct(job_.overlap.extent()));
@@ -328,7 +318,7 @@ Vec3 PanelSolver::middle_of(const Panel& panel) const {
   ray.at = setting_.chart.at({half(first_across(panel.along)), half(second_across(panel.along))});
   ray.height = half(panel.along);
   const Slice known = panel.nodes.size() > 0 ? panel.nodes : panel.guess;
-  double least = std::numeric_limits<double>::infinity();
+  double least = kInfinity;
   for (const SigmaRay& node : std::span(r_.arena.node).subspan(known.begin, known.size())) {
     const double u = ray.at[0] - node.at[0], v = ray.at[1] - node.at[1];
     if (!node.found || node.along != panel.along || std::hypot(u, v) >= least) continue;
@@ -339,10 +329,7 @@ Vec3 PanelSolver::middle_of(const Panel& panel) const {
 }
 
 bool PanelSolver::crosses(const implicit::Kink& kink, const Panel& panel) const {
-  // A kink in a third derivative bends the pressure so little that halving is cheaper down to here.
-  constexpr double kThirdDerivative = 1e-5, kOfStar = 1e-4;
-  const bool star = job_.star != nullptr;
-  if (kink.order > 2 && (star ? job_.error > kOfStar : job_.error >= kThirdDerivative)) return false;
+  if (is_mild(kink, job_.error)) return false;
   // Around the middle, as far as the panel reaches across.
   const Box box = box_of(panel);
   double square = 0.0;
@@ -350,7 +337,7 @@ bool PanelSolver::crosses(const implicit::Kink& kink, const Panel& panel) const 
     const double reach = box.extent().dot(setting_.view.frame.axis[static_cast<std::size_t>(k)].cwiseAbs());
     square += reach * reach;
   }
-  const double radius = 0.5 * std::sqrt(square) / kLeastCosine;
+  const double radius = 0.5 * std::sqrt(square) / kRayCosine;
   const Vec3 x = middle_of(panel);
   return std::abs(kink.value(x)) <= kink.change(x, radius);
 }
@@ -464,12 +451,11 @@ double PanelSolver::estimate() {
   const double area = (std::abs(e.area) + std::sqrt(e.area_square) + e.missed_area) / all_.area;
   const double first = (e.first.norm() + std::sqrt(e.first_square)) / (all_.load * std::sqrt(all_.area));
   const double energy = (std::abs(e.energy) + std::sqrt(e.energy_square)) / energy_;
-  return kSafety * std::max({force, area, first, energy});
+  return kTwoOrders * std::max({force, area, first, energy});
 }
 
 /// Moves the panels that err most to `chosen`; what the others err by is a share of what is asked. @return whether there are such
 bool PanelSolver::choose() {
-  constexpr double kShare = 0.5;
   std::vector<std::uint32_t>& order = r_.order;
   order.clear();
   r_.value.resize(r_.panel.size());
@@ -485,7 +471,7 @@ bool PanelSolver::choose() {
     square += e * e;
     sum += e;
     // Errors of one sign add up, others cancel: between the two.
-    if (std::sqrt(std::sqrt(square) * sum) > kShare / kSafety * job_.error) break;
+    if (std::sqrt(std::sqrt(square) * sum) > kOfKept / kTwoOrders * job_.error) break;
   }
   if (kept == order.size()) {
     if (order.empty()) return false;
@@ -584,7 +570,7 @@ bool PanelSolver::has_one_sheet() {
       for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
         const PanelPoint& p = r_.arena.point[i];
         if (p.pressure < kOfLargest * largest) continue;
-        r_.way.push_back({p.at, p.fall[side] > 0.0 ? p.pressure / p.fall[side] : setting_.view.reach, 0.0, std::numeric_limits<double>::infinity()});
+        r_.way.push_back({p.at, p.fall[side] > 0.0 ? p.pressure / p.fall[side] : setting_.view.reach, 0.0, kInfinity});
       }
     }
     if (!ends_first(static_cast<int>(side))) return false;

@@ -33,7 +33,7 @@ struct PanelJob {
   bool graph_only;                    ///< fits only where Sigma seems to be one graph over a plane
   const PolarCover* star = nullptr;   ///< panels of a star about its origin, which holds one patch; or null: of the plane across the mean normal
   std::span<const ImprintPlace> imprint{};  ///< that may lie between nodes
-  std::span<const ContactBody* const> rival{};  ///< the third bodies, where a star shares space with them
+  Thirds rival{};  ///< the third bodies, where a star shares space with them
 };
 
 struct PanelOutcome {

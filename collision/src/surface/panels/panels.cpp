@@ -3,6 +3,8 @@
 #include <numeric>
 #include <utility>
 
+#include "numbers.h"
+#include "surface/accuracy.h"
 #include "surface/panels/panel_pass.h"
 
 namespace supple::collision {
@@ -68,7 +70,7 @@ SigmaRay Pass::start_ray(const Panel& panel, const Plane& place, std::span<const
   ray.low = low - margin;
   ray.high = high + margin;
   ray.height = 0.5 * (low + high);
-  double least = std::numeric_limits<double>::infinity();
+  double least = kInfinity;
   for (const SigmaRay& other : near) {
     if (!other.found || other.along != panel.along) continue;
     const double du = at[0] - other.at[0], dv = at[1] - other.at[1], square = du * du + dv * dv;
@@ -106,7 +108,7 @@ void Pass::look_at_lattice() {
       const bool inside = !panel.walls || (ray.height > panel.low[panel.along] && ray.height < panel.high[panel.along]);
       // A foot between walls that the signs at these do not tell has another one beside it.
       const bool more = panel.walls && !ray.bracketed;
-      if (ray.pressure > 0.0 && inside) panel.steep = panel.steep || ray.cosine < kLeastCosine || more;
+      if (ray.pressure > 0.0 && inside) panel.steep = panel.steep || ray.cosine < kRayCosine || more;
       const Plane slope = s_.chart.slopes(ray.place, ray.slope);
       for (const std::size_t c : {0u, 1u}) change[c] += std::abs(slope[c]) * width_of(panel, c);
     }
@@ -206,7 +208,7 @@ void Pass::predict_line(std::uint32_t index, std::uint16_t level, std::size_t ro
 
 /// What bounds the patch most at the rays of the lattice. Walls count as the pressures of both bodies change on the way to them.
 void Pass::find_least() {
-  a_.least.assign(a_.ray.size(), {std::numeric_limits<double>::infinity(), {}});
+  a_.least.assign(a_.ray.size(), {kInfinity, {}});
   for (std::size_t i = 0; i < a_.query.size(); ++i) {
     const LevelQuery& query = a_.query[i];
     if (s_.levels.is_kink(query.level)) continue;
@@ -300,7 +302,6 @@ bool Pass::judge(PanelArena::Search& search, const LevelValue& value, const Sigm
 
 /// Newton's method along lines and rays at once, within brackets.
 void Pass::search() {
-  constexpr int kMostSteps = 40;
   a_.cut_ray.clear();
   a_.open.clear();
   for (std::size_t i = 0; i < a_.search.size(); ++i) {
@@ -312,7 +313,7 @@ void Pass::search() {
     a_.cut_ray.push_back(start_ray(panel, at, lattice_of(search.line)));
     a_.open.push_back(static_cast<std::uint32_t>(i));
   }
-  for (int step = 0; step < kMostSteps && !a_.open.empty(); ++step) step_searches();
+  for (int step = 0; step < kBracketSteps && !a_.open.empty(); ++step) step_searches();
   for (const std::uint32_t i : a_.open) a_.search[i].found = !a_.search[i].root.open_low && !a_.search[i].root.open_high;
 }
 
@@ -457,7 +458,7 @@ double Pass::add_points(const PanelArena::Piece& piece, Panel& panel, PatchSums&
   for (std::size_t i = 0; i < n_; ++i) {
     const SigmaRay& ray = rays[piece.first + i * piece.stride];
     if (!ray.found || !(ray.cosine > 0.0)) continue;
-    if (ray.pressure > 0.0 && ray.cosine < kLeastCosine) panel.steep = true;
+    if (ray.pressure > 0.0 && ray.cosine < kRayCosine) panel.steep = true;
     const double pressure = std::max(ray.pressure, 0.0), stretch = line.weight * length * s_.chart.stretch(ray.place) / ray.cosine, area = stretch * gauss_.weight[i];
     const Vec3 at = s_.view.frame.world(ray.local(ray.height));
     sums.add(at - s_.reference, ray.normal, area, pressure);

@@ -19,6 +19,9 @@
 
 namespace supple::collision {
 
+/// Least cosine between Sigma's normal and the rays that see it: panels whose rays are nearer to grazing are parted.
+inline constexpr double kRayCosine = 0.3;
+
 /// Points of a larger array.
 struct Slice {
   std::uint32_t begin = 0, end = 0;

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "numbers.h"
 #include "supple/core/interrupt.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
@@ -19,7 +21,7 @@ void read(const RayFrame& frame, const PressureBatch& batch, std::size_t i, Sigm
   ray.mismatch = std::abs(a - b);
   ray.cosine = length > 0.0 ? steepness / length : 0.0;
   if (!(steepness > 0.0)) {  // Sigma is no graph here: which way it lies is all that is known
-    ray.step = a > b ? sense * std::numeric_limits<double>::infinity() : -sense * std::numeric_limits<double>::infinity();
+    ray.step = a > b ? sense * kInfinity : -sense * kInfinity;
     ray.pressure = std::min(a, b);
     ray.rise = ray.slope = {};
     return;
@@ -73,11 +75,10 @@ void probe(SigmaView& view, std::span<SigmaRay> rays, std::span<const std::uint3
 }
 
 void lift(SigmaView& view, std::span<SigmaRay> rays, double enough, RayScratch& scratch) {
-  constexpr int kMostSteps = 40;
   std::vector<std::uint32_t>& open = scratch.open;
   open.resize(rays.size());
   std::iota(open.begin(), open.end(), 0u);
-  for (int step = 0; step < kMostSteps && !open.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open.empty(); ++step) {
     probe(view, rays, open, scratch);
     std::erase_if(open, [&](std::uint32_t i) { return !advance(rays[i], enough, view.reach); });
   }

@@ -1,11 +1,13 @@
 #include "surface/polar/apex.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
+#include "numbers.h"
+#include "pairs/boxes.h"
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 #include "surface/quadrature.h"
 
 namespace supple::collision {
@@ -13,10 +15,9 @@ namespace {
 
 /// Distances along rays out of the apex to where the body ends; its pressure is positive at the apex and falls through 0 once on each.
 void find_ends(PairPressure& pressure, int side, const Vec3& apex, std::span<const Vec3> way, double longest, std::vector<double>& end) {
-  constexpr int kHalvings = 52;
   std::vector<double> low(way.size(), 0.0), high(way.size(), longest), value(way.size());
   std::vector<Vec3> point(way.size());
-  for (int step = 0; step < kHalvings; ++step) {
+  for (int step = 0; step < kBracketSteps; ++step) {
     for (std::size_t i = 0; i < way.size(); ++i) point[i] = apex + 0.5 * (low[i] + high[i]) * way[i];
     pressure.evaluate(side, point, value);
     for (std::size_t i = 0; i < way.size(); ++i) (value[i] > 0.0 ? low[i] : high[i]) = 0.5 * (low[i] + high[i]);
@@ -28,15 +29,13 @@ void find_ends(PairPressure& pressure, int side, const Vec3& apex, std::span<con
 /// Sigma is to the apex.
 Apex apex_across(PairPressure& pressure, int side, const Vec3& from, const Vec3& outward, double longest) {
   constexpr int kPlaces = 64;
-  std::array<double, 1> own, other;
   const auto reach = [&](const Vec3& way, bool kept) {
     double far = 0.0;
     for (int k = 1; k <= kPlaces; ++k) {
       const double t = longest * k / kPlaces;
       const Vec3 x = from + t * way;
-      pressure.evaluate(side, {&x, 1}, own);
-      pressure.evaluate(1 - side, {&x, 1}, other);
-      if (!(own[0] > 0.0) || (kept && other[0] >= own[0])) break;
+      const double own = pressure.value(side, x);
+      if (!(own > 0.0) || (kept && pressure.value(1 - side, x) >= own)) break;
       far = t;
     }
     return far;
@@ -47,27 +46,25 @@ Apex apex_across(PairPressure& pressure, int side, const Vec3& from, const Vec3&
 
 }  // namespace
 
-std::optional<Apex> find_apex(PairPressure& pressure, int side, std::span<const ContactBody* const> thirds, const Vec3& from, const Vec3& outward) {
+std::optional<Apex> find_apex(PairPressure& pressure, int side, Thirds thirds, const Vec3& from, const Vec3& outward) {
   const implicit::FieldView& field = pressure.field(side);
   if (!field.convex()) return std::nullopt;
   const Box box = field.surface_box();
-  std::array<double, 1> own, other;
-  if (!box.lower.allFinite() || !box.upper.allFinite()) {
+  if (!is_finite(box)) {
     const std::optional<implicit::CorePoint> core = field.core_point(from);
     if (!core || !core->round) return std::nullopt;  // a half-space
-    std::array<Vec3, 1> slope;
-    pressure.evaluate(side, {&from, 1}, own, slope);
-    return Apex{.at = -slope[0].normalized(), .parallel = true};
+    Vec3 slope;
+    static_cast<void>(pressure.value(side, from, slope));
+    return Apex{.at = -slope.normalized(), .parallel = true};
   }
   if (thirds.empty()) return apex_across(pressure, side, from, outward, box.extent().norm());
   const std::optional<implicit::CorePoint> core = field.core_point(box.centre());
   Apex apex{.at = core ? core->point : box.centre()};
-  pressure.evaluate(side, {&apex.at, 1}, own);
-  pressure.evaluate(1 - side, {&apex.at, 1}, other);
-  if (!(own[0] > 0.0)) return std::nullopt;
+  const double own = pressure.value(side, apex.at);
+  if (!(own > 0.0)) return std::nullopt;
   double third = 0.0;
   for (const ContactBody* body : thirds) third = std::max(third, body->material.modulus * body->field.value(apex.at));
-  apex.lost = other[0] > std::max(own[0], third);
+  apex.lost = pressure.value(1 - side, apex.at) > std::max(own, third);
   return apex;
 }
 
@@ -90,7 +87,7 @@ void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error,
         for (int k = 0; k < 2 * n; ++k) {
           const math::SinCos turn = math::sin_cos(std::numbers::pi * (k + 0.5) / n);
           way.push_back(Vec3(across * turn.cos, across * turn.sin, z));
-          share.push_back(2.0 * std::numbers::pi / n * height.weight[h] / panels);
+          share.push_back(kTurn / n * height.weight[h] / panels);
         }
       }
     }

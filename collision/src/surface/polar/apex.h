@@ -2,11 +2,12 @@
 /// Columns through the space that a convex body loses to others, from one place of it.
 #pragma once
 
-#include <limits>
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "numbers.h"
 #include "surface/pair_pressure.h"
 
 namespace supple::collision {
@@ -21,13 +22,26 @@ struct Apex {
   bool lost = false;       ///< to the other body of the pair
 
   [[nodiscard]] Vec3 way(const Vec3& x) const { return parallel ? at : Vec3((x - at).normalized()); }
-  [[nodiscard]] double distance(const Vec3& x) const { return parallel ? std::numeric_limits<double>::infinity() : (x - at).norm(); }
+  [[nodiscard]] double distance(const Vec3& x) const { return parallel ? kInfinity : (x - at).norm(); }
 };
+
+/// Area across a column over the distance along it: a polynomial, whose factors are what the two curvatures of Sigma make of a step.
+struct Swept {
+  std::array<double, 3> of{};
+  [[nodiscard]] double width(double t) const { return of[0] + t * (of[1] + t * of[2]); }
+  [[nodiscard]] double widens(double t) const { return of[1] + 2.0 * t * of[2]; }
+  [[nodiscard]] double volume(double t) const { return t * (of[0] + t * (0.5 * of[1] + t * of[2] / 3.0)); }
+};
+/// The same of a column out of an apex. @param flux  width where it leaves Sigma   @param bend  over the distance from the apex [1/m]
+[[nodiscard]] inline Swept swept_out_of_apex(double flux, double bend) { return {{flux, 2.0 * bend * flux, bend * bend * flux}}; }
 
 /// @param thirds  that take space from the pair, too: then the apex is the middle of the body, for all its pairs
 /// @param from  a place of Sigma   @param outward  its normal out of the body
 /// @return none of bodies that are not known to be convex
-[[nodiscard]] std::optional<Apex> find_apex(PairPressure& pressure, int side, std::span<const ContactBody* const> thirds, const Vec3& from, const Vec3& outward);
+[[nodiscard]] std::optional<Apex> find_apex(PairPressure& pressure, int side, Thirds thirds, const Vec3& from, const Vec3& outward);
+
+/// Gauss points more along a column where it may go through most of the body.
+inline constexpr int kMoreAcross = 2;
 
 /// Points through all of a convex body as seen from the apex, and the volumes that they stand for; as many as `error` of the integral of the pressure asks.
 void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error, std::vector<Vec3>& point, std::vector<double>& volume);

@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
 
 namespace supple::collision {
@@ -13,8 +13,6 @@ namespace {
 
 constexpr double kFarOff = 0.2;          // of the radius: crossings from where the heights that are guessed have them
 constexpr int kSamples = 8;              // of the heights along a ray, to find crossings
-constexpr int kCrossingSteps = 8;
-constexpr int kBorderSteps = 16;         // of Illinois' method to the border of an imprint
 constexpr double kBorder = 0.01;         // of the way from its middle
 constexpr double kAtOrigin = 1e-9;       // radius of a crossing, over that of the rim: the kink goes through the origin
 
@@ -52,8 +50,7 @@ void PolarRuleSolver::find_kinks(PairPressure& pressure) {
   all_kinks_ = pressure.kinks(box, kinks_);
   double square = 0.0;
   for (const Vec3& x : rim_batch_.point) square = std::max(square, (x - frame_.origin).squaredNorm());
-  constexpr double kMargin = 1.2;  // what finer rules may find the rim to reach beyond
-  const double reach = kMargin * std::sqrt(square);
+  const double reach = kBeyondRim * std::sqrt(square);
   std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
 }
 
@@ -76,9 +73,7 @@ double PolarRuleSolver::side_of(std::size_t kink, PairPressure& pressure, const 
   if (kink < kinks_.size()) return kinks_[kink].value(x);
   const ContactBody& body = *third_[kink - kinks_.size()];
   const double share = frame_.depth[0] / frame_.thickness;
-  double a, b;
-  pressure.evaluate(0, {&x, 1}, {&a, 1});
-  pressure.evaluate(1, {&x, 1}, {&b, 1});
+  const double a = pressure.value(0, x), b = pressure.value(1, x);
   return body.material.modulus * body.field.value(x) - (share * a + (1.0 - share) * b);
 }
 
@@ -260,7 +255,7 @@ bool PolarRuleSolver::cross_imprints(PairPressure& pressure, std::size_t ray, st
     Sample left = samples[j], right = samples[j + 1], last = left;
     if ((left.s > 0.0) == (right.s > 0.0)) continue;
     const double from = left.share, to = right.share, within = left.within ? from : to;
-    for (int step = 0; step < kBorderSteps; ++step) {
+    for (int step = 0; step < kBracketSteps; ++step) {
       const double before = last.share;
       last = look(left.share + (right.share - left.share) * left.s / (left.s - right.s), false);
       if (step > 0 && std::abs(last.share - before) <= kBorder * std::abs(last.share - within)) break;
@@ -289,75 +284,85 @@ PolarRuleSolver::Sheet PolarRuleSolver::sheet_of(const implicit::Kink& kink) con
   return sheet;
 }
 
-/// Where the rays cross kinks: first on the heights as the curvature at the peak and the rim give them, then on Sigma.
-void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
-  const double enough = std::min(1e-3, 0.1 * std::sqrt(error));  // pieces that miss a kink by x leave an error of x^2
+/// Appends where a ray crosses a kink between two places with different sides of it, on the heights that are guessed.
+/// @param others  of `crossings_`, those that do not belong to this ray and kink
+void PolarRuleSolver::cross_between(PairPressure& pressure, const RaySheet& on, Interval where, Interval sides, std::size_t others) {
+  double share = where.lower + (where.upper - where.lower) * sides.lower / (sides.lower - sides.upper);
+  for (int step = 0; step < 3; ++step) {
+    const double s = side_on_ray(pressure, on, share, model_height(on.ray, share));
+    const bool lower = (s > 0.0) == (sides.lower > 0.0);
+    (lower ? where.lower : where.upper) = share;
+    (lower ? sides.lower : sides.upper) = s;
+    share = where.lower + (where.upper - where.lower) * sides.lower / (sides.lower - sides.upper);
+  }
+  // Two of one kink must not become one; the borders of third bodies are round.
+  const bool field = on.kink < kinks_.size(), alone = crossings_.size() == others && field;
+  const double far = alone ? kFarOff : 0.5 / kSamples;
+  if (!alone && crossings_.size() > others && field) {
+    Crossing& last = crossings_.back();
+    last.left = std::max(0.0, last.radius - far);
+    last.right = last.radius + far;
+  }
+  crossings_.push_back({on.ray, on.kink, share, model_height(on.ray, share), std::max(0.0, share - far), share + far, false});
+}
+
+/// A kink as a ray sees it. @param c  of `crossing_`   @param reach  of the ray
+PolarRuleSolver::RaySheet PolarRuleSolver::sheet_along(std::size_t ray, std::size_t c, const Vec3& reach) const {
+  const Sheet& sheet = sheets_[c];
+  const Vec3 bend_along = sheet.bend * reach, bend_up = sheet.bend * frame_.axis;
+  return {ray, crossing_[c], reach, sheet.told, sheet.value, sheet.slope.dot(reach), sheet.slope.dot(frame_.axis),
+          bend_along.dot(reach), 2.0 * bend_along.dot(frame_.axis), bend_up.dot(frame_.axis)};
+}
+
+/// s at a share of the ray and a height above it.
+double PolarRuleSolver::side_on_ray(PairPressure& pressure, const RaySheet& on, double share, double rise) {
+  if (!on.told) return side_of(on.kink, pressure, frame_.origin + share * on.reach + rise * frame_.axis);
+  return on.value + share * (on.along + on.square * share + on.mixed * rise) + rise * (on.up + on.up_square * rise);
+}
+
+/// Where the rays cross kinks, on the heights as the curvature at the peak and the rim give them.
+void PolarRuleSolver::guess_crossings(PairPressure& pressure) {
   crossings_.clear();
   sheets_.clear();
   for (const std::size_t k : crossing_) sheets_.push_back(k < kinks_.size() ? sheet_of(kinks_[k]) : Sheet{});
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
-    std::array<double, kSamples + 1> height;
+    std::array<double, kSamples + 1> height, s;
     for (int j = 0; j <= kSamples; ++j) height[static_cast<std::size_t>(j)] = model_height(i, static_cast<double>(j) / kSamples);
     for (std::size_t c = 0; c < crossing_.size(); ++c) {
-      const std::size_t k = crossing_[c];
-      const Sheet& sheet = sheets_[c];
-      const Vec3 bend_along = sheet.bend * reach, bend_up = sheet.bend * frame_.axis;
-      const double along = sheet.slope.dot(reach), up = sheet.slope.dot(frame_.axis);
-      const double square = bend_along.dot(reach), mixed = 2.0 * bend_along.dot(frame_.axis), up_square = bend_up.dot(frame_.axis);
-      const auto side_at = [&](double share, double rise) {
-        if (!sheet.told) return side_of(k, pressure, frame_.origin + share * reach + rise * frame_.axis);
-        return sheet.value + share * (along + square * share + mixed * rise) + rise * (up + up_square * rise);
-      };
-      const auto side = [&](double share) { return side_at(share, model_height(i, share)); };
+      const RaySheet on = sheet_along(i, c, reach);
+      for (std::size_t j = 0; j < s.size(); ++j) s[j] = side_on_ray(pressure, on, static_cast<double>(j) / kSamples, height[j]);
+      if (on.kink >= kinks_.size() && cross_imprints(pressure, i, on.kink, s)) continue;
       const std::size_t others = crossings_.size();
-      const auto between = [&](double left, double s_left, double right, double s_right) {
-        double share = left + (right - left) * s_left / (s_left - s_right);
-        for (int step = 0; step < 3; ++step) {
-          const double s = side(share);
-          ((s > 0.0) == (s_left > 0.0) ? left : right) = share;
-          ((s > 0.0) == (s_left > 0.0) ? s_left : s_right) = s;
-          share = left + (right - left) * s_left / (s_left - s_right);
-        }
-        // Two of one kink must not become one; the borders of third bodies are round.
-        const bool alone = crossings_.size() == others && k < kinks_.size();
-        const double far = alone ? kFarOff : 0.5 / kSamples;
-        if (!alone && crossings_.size() > others && k < kinks_.size()) {
-          Crossing& last = crossings_.back();
-          last.left = std::max(0.0, last.radius - far);
-          last.right = last.radius + far;
-        }
-        crossings_.push_back({i, k, share, model_height(i, share), std::max(0.0, share - far), share + far, false});
-      };
-      std::array<double, kSamples + 1> s;
-      for (std::size_t j = 0; j < s.size(); ++j) {
-        s[j] = side_at(static_cast<double>(j) / kSamples, height[j]);
-      }
-      if (k >= kinks_.size() && cross_imprints(pressure, i, k, s)) continue;
       for (std::size_t j = 0; j < kSamples; ++j) {
         const double left = static_cast<double>(j) / kSamples, right = static_cast<double>(j + 1) / kSamples;
         if ((s[j] > 0.0) != (s[j + 1] > 0.0)) {
-          between(left, s[j], right, s[j + 1]);
+          cross_between(pressure, on, {left, right}, {s[j], s[j + 1]}, others);
           continue;
         }
         // A ray that dips through a kink and back between two samples: at the vertex of a parabola through three of them.
         if (j == 0 || (s[j - 1] > 0.0) != (s[j] > 0.0)) continue;
         const double bend = s[j - 1] - 2.0 * s[j] + s[j + 1], slope = 0.5 * (s[j + 1] - s[j - 1]);
         if (!(bend * s[j] > 0.0) || !(std::abs(slope) < std::abs(bend))) continue;
-        const double vertex = left - slope / bend / kSamples;
-        const double dip = side(vertex);
+        const double vertex = left - slope / bend / kSamples, dip = side_on_ray(pressure, on, vertex, model_height(i, vertex));
         if ((dip > 0.0) == (s[j] > 0.0)) continue;
-        const double before = vertex < left ? left - 1.0 / kSamples : left, after = vertex < left ? left : right;
-        between(before, vertex < left ? s[j - 1] : s[j], vertex, dip);
-        between(vertex, dip, after, vertex < left ? s[j] : s[j + 1]);
+        const bool early = vertex < left;
+        cross_between(pressure, on, {early ? left - 1.0 / kSamples : left, vertex}, {early ? s[j - 1] : s[j], dip}, others);
+        cross_between(pressure, on, {vertex, early ? left : right}, {dip, early ? s[j] : s[j + 1]}, others);
       }
     }
   }
+}
+
+/// Where the rays cross kinks on Sigma, by Newton's method from where they are guessed.
+void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
+  const double enough = std::min(1e-3, 0.1 * std::sqrt(error));  // pieces that miss a kink by x leave an error of x^2
+  guess_crossings(pressure);
   PressureBatch& batch = crossing_batch_;
   batch.resize(crossings_.size());
   open_.resize(crossings_.size());
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  for (int step = 0; step < kCrossingSteps && !open_.empty(); ++step) {
+  for (int step = 0; step < kFreeSteps && !open_.empty(); ++step) {
     for (const std::size_t c : open_) {
       const Crossing& x = crossings_[c];
       batch.point[c] = frame_.origin + (x.radius * rays_.radius[x.ray]) * direction(rays_.cosine[x.ray], rays_.sine[x.ray]) +
@@ -448,7 +453,7 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
             share = *corner;
             panel.leaves = true;
           }
-        } else if (!by_sectors_) {
+        } else if (!about_middle_) {
           change.touch = touch_between(before, here);
           if (change.touch) {
             change.touch->angle = place_at(rule.node[before.size() > here.size() ? k - 1 : k]);

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <limits>
-#include <numbers>
 
+#include "numbers.h"
 #include "supple/core/math.h"
-#include "surface/polar/turns.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
@@ -20,19 +19,13 @@ constexpr int kClimbSteps = 10;
 constexpr int kHalvings = 4;
 constexpr double kBeyond = 1.2;         // of Newton's step, which alone would not arrive where the excess is concave
 constexpr double kShortClimb = 1e-4;    // of the radius of the patch
-constexpr std::size_t kFewRays = 8, kRays = 16;
 constexpr double kFirst = 0.05;         // of the radius of the patch
 constexpr double kRough = 0.05, kFine = 1e-4;  // of the distance from the centre of the imprint
-constexpr int kBorderSteps = 40;
 constexpr double kGrowth = 2.0;         // of the distance in a step
 constexpr int kLeaveSteps = 5;
-constexpr int kTouchSteps = 12, kTouchNewton = 3;
+constexpr int kTouchNewton = 3;
 constexpr double kTouch = 1e-6;         // angle between ray and border [rad]: the ray is off by the square
 constexpr double kFarthest = 4.0;       // radii of the patch
-
-Vec2 in_units(const PeakFrame& frame, const Vec3& from_origin) {
-  return {from_origin.dot(frame.u) / frame.u.squaredNorm(), from_origin.dot(frame.v) / frame.v.squaredNorm()};
-}
 
 Vec3 place_of(const PeakFrame& frame, const Vec2& at, double height) {
   return frame.origin + at.x() * frame.u + at.y() * frame.v + height * frame.axis;
@@ -40,14 +33,14 @@ Vec3 place_of(const PeakFrame& frame, const Vec2& at, double height) {
 
 /// Over a metre, in units of u and v.
 Vec2 direction(const PeakFrame& frame, double turns) {
-  const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * turns);
+  const auto [s, c] = math::sin_cos(kTurn * turns);
   return {c / frame.u.norm(), s / frame.v.norm()};
 }
 
 }  // namespace
 
 std::optional<double> Imprint::middle_on(const Vec2& way) const {
-  double nearest = std::numeric_limits<double>::infinity(), farthest = 0.0;
+  double nearest = kInfinity, farthest = 0.0;
   bool around = false;
   for (std::size_t k = 0; k < border.size(); ++k) {
     const Vec2 &a = border[k], &b = border[(k + 1) % border.size()];
@@ -82,28 +75,27 @@ void ImprintFinder::look(PairPressure& pressure, const PeakFrame& frame, const C
   place_.resize(n);
   value_.resize(n);
   slope_.resize(n);
-  const Vec3 axis = frame.axis;
   for (const bool last : {false, true}) {
     for (std::size_t i = 0; i < n; ++i) batch_.point[i] = place_of(frame, spots_[i].at, spots_[i].height);
     pressure.evaluate(batch_);
     for (std::size_t i = 0; i < n; ++i) {
       Spot& spot = spots_[i];
-      const Vec3 &ga = batch_.slope_a[i], &gb = batch_.slope_b[i];
-      const double at = ga.dot(axis), bt = gb.dot(axis), rate = bt - at, lift = (batch_.a[i] - batch_.b[i]) / rate;
-      const bool near = rate > 0.0 && std::abs(lift) <= 2.0 * frame.thickness;
+      const AlongAxis sigma(batch_.slope_a[i], batch_.slope_b[i], frame.axis);
+      const double lift = sigma.lift(batch_.a[i], batch_.b[i]);
+      const bool near = sigma.rate > 0.0 && std::abs(lift) <= 2.0 * frame.thickness;
       if (near) spot.height += lift;
       if (!last) continue;
       place_[i] = place_of(frame, spot.at, spot.height);
-      spot.p = near ? (batch_.a[i] * bt - batch_.b[i] * at) / rate : -std::numeric_limits<double>::infinity();
-      spot.fall = Vec2(ga.dot(frame.u) * bt - gb.dot(frame.u) * at, ga.dot(frame.v) * bt - gb.dot(frame.v) * at) / rate;
-      spot.rise = Vec2((ga - gb).dot(frame.u), (ga - gb).dot(frame.v)) / rate;  // of Sigma, for now
+      spot.p = near ? sigma.pressure(batch_.a[i], batch_.b[i]) : -kInfinity;
+      spot.fall = {sigma.slope(frame.u), sigma.slope(frame.v)};
+      spot.rise = {sigma.rise(frame.u), sigma.rise(frame.v)};  // of Sigma, for now
     }
   }
   body.field.evaluate(place_, value_, slope_);
   for (std::size_t i = 0; i < n; ++i) {
     Spot& spot = spots_[i];
     const Vec3& g = slope_[i];
-    const double up = g.dot(axis);
+    const double up = g.dot(frame.axis);
     spot.third = body.material.modulus * value_[i];
     spot.excess = spot.third - spot.p;
     spot.rise = body.material.modulus * Vec2(g.dot(frame.u) + up * spot.rise.x(), g.dot(frame.v) + up * spot.rise.y()) - spot.fall;
@@ -127,10 +119,10 @@ bool ImprintFinder::begin_at_core(PairPressure& pressure, const PolarCover& cove
   for (int step = 0; step < kCoreSteps; ++step) {
     const std::optional<implicit::CorePoint> core = body.field.core_point(x);
     if (!core) return false;
-    spots_.assign(1, on_patch(cover, in_units(frame, core->point - frame.origin)));
+    spots_.assign(1, on_patch(cover, frame.parts_of(core->point - frame.origin)));
     Spot& spot = spots_[0];
     if ((place_of(frame, spot.at, spot.height) - core->point).norm() > core->radius + cover.thickness + kNear * radius) {
-      spot.third = -std::numeric_limits<double>::infinity();
+      spot.third = -kInfinity;
       return true;
     }
     look(pressure, frame, body);
@@ -150,11 +142,11 @@ void ImprintFinder::begin_on_grid(PairPressure& pressure, const PolarCover& cove
   patch.include(frame.origin);
   const Box surface = body.field.surface_box();
   const Box box{surface.lower.cwiseMax(patch.lower), surface.upper.cwiseMin(patch.upper)};
-  Vec2 low = Vec2::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  Vec2 low = Vec2::Constant(kInfinity), high = -low;
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 x((corner & 1) != 0 ? box.upper.x() : box.lower.x(), (corner & 2) != 0 ? box.upper.y() : box.lower.y(),
                  (corner & 4) != 0 ? box.upper.z() : box.lower.z());
-    const Vec2 at = in_units(frame, x - frame.origin);
+    const Vec2 at = frame.parts_of(x - frame.origin);
     low = low.cwiseMin(at);
     high = high.cwiseMax(at);
   }
@@ -208,11 +200,11 @@ bool ImprintFinder::follow_border(PairPressure& pressure, const PeakFrame& frame
                                   double enough, double farthest) {
   const std::size_t n = way_.size();
   low_.assign(n, 0.0);
-  high_.assign(n, std::numeric_limits<double>::infinity());
+  high_.assign(n, kInfinity);
   done_.assign(n, 0);
   spots_.assign(n, centre);
   std::size_t open = n;
-  for (int iteration = 0; iteration < kBorderSteps && open > 0; ++iteration) {
+  for (int iteration = 0; iteration < kBracketSteps && open > 0; ++iteration) {
     for (std::size_t k = 0; k < n; ++k) spots_[k].at = centre.at + radius_[k] * way_[k];
     look(pressure, frame, body);
     for (std::size_t k = 0; k < n; ++k) {
@@ -242,15 +234,14 @@ bool ImprintFinder::leave_between(PairPressure& pressure, const PeakFrame& frame
   Vec2 move = Vec2::Zero();
   for (int newton = 0; newton < kLeaveSteps; ++newton) {
     spot = look(pressure, frame, body, spot.at, spot.height);
-    const double area = cross(spot.fall, spot.rise);
-    move = Vec2(spot.excess * spot.fall.y() - spot.p * spot.rise.y(), spot.p * spot.rise.x() - spot.excess * spot.fall.x()) / area;
+    move = meeting_of(spot.fall, -spot.p, spot.rise, -spot.excess);
     if (!(move.norm() <= (a.spot.at - b.spot.at).norm())) return false;
     spot.at += move;
   }
   const Vec2 way = spot.at - centre.at;
   if (!(cross(a.spot.at - centre.at, way) > 0.0) || !(cross(way, b.spot.at - centre.at) > 0.0)) return false;
   const double metres_x = way.x() * frame.u.norm(), metres_y = way.y() * frame.v.norm();
-  out.turns = math::atan2(metres_y, metres_x) / (2.0 * std::numbers::pi);
+  out.turns = math::atan2(metres_y, metres_x) / (kTurn);
   if (out.turns < a.turns) out.turns += 1.0;
   out.radius = std::sqrt(metres_x * metres_x + metres_y * metres_y);
   out.spot = spot;
@@ -264,7 +255,7 @@ std::optional<Vec2> ImprintFinder::touch_between(PairPressure& pressure, const P
   double low = 0.0, high = 1.0, at_low = along(a.spot), at_high = along(b.spot);
   if ((at_low > 0.0) == (at_high > 0.0)) return std::nullopt;
   Spot spot = a.spot;
-  for (int step = 0; step < kTouchSteps; ++step) {
+  for (int step = 0; step < kBracketSteps; ++step) {
     const double share = low + (high - low) * at_low / (at_low - at_high);
     const Vec2 way = direction(frame, (1.0 - share) * a.turns + share * b.turns);
     double r = (1.0 - share) * a.radius + share * b.radius;
@@ -292,33 +283,28 @@ std::optional<Vec2> ImprintFinder::touch_between(PairPressure& pressure, const P
 ImprintFinder::Spot ImprintFinder::centre_at(const PeakFrame& frame, const Vec3& inside) {
   const Vec3 from = inside - frame.origin;
   Spot centre;
-  centre.at = in_units(frame, from);
+  centre.at = frame.parts_of(from);
   centre.height = from.dot(frame.axis);
   return centre;
 }
 
-/// The border along so many ways from the centre, finely along `kRays`. @param first  distance to begin at [m]
+/// The border along so many ways from the centre, finely along `kManyRays`. @param first  distance to begin at [m]
 bool ImprintFinder::send_ways(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Spot& centre, std::size_t ways, double first) {
   const PeakFrame& frame = cover.frame;
   way_.clear();
   for (std::size_t k = 0; k < ways; ++k) way_.push_back(direction(frame, static_cast<double>(k) / static_cast<double>(ways)));
   radius_.assign(ways, first);
-  return follow_border(pressure, frame, body, centre, ways == kRays ? kFine : kRough, kFarthest * (cover.rim.front() - frame.origin).norm());
+  return follow_border(pressure, frame, body, centre, ways == kManyRays ? kFine : kRough, kFarthest * (cover.rim.front() - frame.origin).norm());
 }
 
 /// From the ends of the ways. @return twice the area within, in units of u and v
 double ImprintFinder::move_to_middle(PairPressure& pressure, const PeakFrame& frame, const ContactBody& body, Spot& centre) {
   const std::size_t n = way_.size();
-  double area = 0.0;
-  Vec2 middle = Vec2::Zero();
-  for (std::size_t k = 0; k < n; ++k) {
-    const Vec2 a = radius_[k] * way_[k], b = radius_[(k + 1) % n] * way_[(k + 1) % n];
-    area += cross(a, b);
-    middle += cross(a, b) / 3.0 * (a + b);
-  }
-  const Spot better = look(pressure, frame, body, centre.at + middle / area, centre.height);
+  PolygonMoments moments;
+  for (std::size_t k = 0; k < n; ++k) moments.add_edge(radius_[k] * way_[k], radius_[(k + 1) % n] * way_[(k + 1) % n]);
+  const Spot better = look(pressure, frame, body, centre.at + moments.first / moments.area, centre.height);
   if (better.least() > 0.0) centre = better;
-  return area;
+  return 2.0 * moments.area;
 }
 
 std::optional<ImprintSize> ImprintFinder::measure(PairPressure& pressure, const PolarCover& cover, const ContactBody& body, const Vec3& inside) {
@@ -327,7 +313,7 @@ std::optional<ImprintSize> ImprintFinder::measure(PairPressure& pressure, const 
   const double lu = frame.u.norm(), lv = frame.v.norm(), radius = (cover.rim.front() - frame.origin).norm();
   double whole = 0.0;
   for (std::size_t k = 0; k < cover.rim.size(); ++k) {
-    whole += cross(in_units(frame, cover.rim[k] - frame.origin), in_units(frame, cover.rim[(k + 1) % cover.rim.size()] - frame.origin));
+    whole += cross(frame.parts_of(cover.rim[k] - frame.origin), frame.parts_of(cover.rim[(k + 1) % cover.rim.size()] - frame.origin));
   }
   if (!(whole > 0.0)) return std::nullopt;
   Spot centre = centre_at(frame, inside);
@@ -340,7 +326,7 @@ std::optional<ImprintSize> ImprintFinder::measure(PairPressure& pressure, const 
     way_.clear();
     radius_.clear();
     for (std::size_t k = 0; k < n; ++k) {
-      const double angle = 2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(n);
+      const double angle = kTurn * static_cast<double>(k) / static_cast<double>(n);
       const auto [sine, cosine] = math::sin_cos(angle);
       const Vec2 to = half[0] * cosine * up + half[1] * sine * across;
       const Vec2 way = to.normalized();
@@ -362,19 +348,19 @@ bool ImprintFinder::trace(PairPressure& pressure, const PolarCover& cover, const
   if (!send_ways(pressure, cover, body, centre, kFewRays, kFirst * (cover.rim.front() - frame.origin).norm())) return false;
   const double first = std::accumulate(radius_.begin(), radius_.end(), 0.0) / static_cast<double>(radius_.size());
   move_to_middle(pressure, frame, body, centre);
-  if (!send_ways(pressure, cover, body, centre, kRays, first)) return false;
+  if (!send_ways(pressure, cover, body, centre, kManyRays, first)) return false;
   out.border.clear();
   out.touches.clear();
   out.leaves.clear();
   nodes_.clear();
   bool around = true;  // the origin
-  for (std::size_t k = 0; k < kRays; ++k) {
+  for (std::size_t k = 0; k < kManyRays; ++k) {
     spots_[k].at = centre.at + radius_[k] * way_[k];
-    nodes_.push_back({static_cast<double>(k) / kRays, radius_[k], spots_[k]});
+    nodes_.push_back({static_cast<double>(k) / kManyRays, radius_[k], spots_[k]});
   }
-  for (std::size_t k = 0; k < kRays; ++k) {
-    const Node &here = nodes_[k], &next = nodes_[(k + 1) % kRays];
-    const Node end{(static_cast<double>(k) + 1.0) / kRays, next.radius, next.spot};
+  for (std::size_t k = 0; k < kManyRays; ++k) {
+    const Node &here = nodes_[k], &next = nodes_[(k + 1) % kManyRays];
+    const Node end{(static_cast<double>(k) + 1.0) / kManyRays, next.radius, next.spot};
     around = around && cross(here.spot.at, end.spot.at) > 0.0;
     out.border.push_back(here.spot.at);
     Node corner;

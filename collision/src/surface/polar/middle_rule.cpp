@@ -4,36 +4,30 @@
 /// straight piece is a triangle, on which Gauss's rule is exact for polynomials. The rest is that of patches that kinks cross.
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
+#include "numbers.h"
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
-#include "surface/polar/turns.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kLeastCosine = 0.2;       // of Sigma's normal to the axis
-constexpr int kWalkSteps = 40;
 constexpr double kFirst = 1e-3;            // kinks nearer to the middle are not gone to
 constexpr double kBeyond = 4.0;            // kinks farther than that, in radii, tell no more than none; which are known depends on how the overlap's box lies
 constexpr double kNear = 0.3;              // pressure at the rim, of that in the middle
 constexpr double kFar = 2.0;               // from Sigma, in the overlap: Newton's method is not believed
-constexpr std::size_t kFewRays = 8, kManyRays = 16;
 constexpr double kRough = 0.05, kFine = 1e-2;  // of the radius, to find the middle and the corners
-constexpr int kSteps = 8;
 constexpr double kClear = 0.1;             // of the radius, from kinks to the middle
 constexpr double kSharp = 0.1;             // of a sector's length: strips whose width grows as a root from there on do so all over it
 constexpr double kStripsBelow = 1e-5;      // errors that take so few points otherwise that it does not pay
 constexpr double kWidest = 1.7;            // sector [rad] in units of u and v
 constexpr double kSameCorner = 1e-6;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<Vec2> circle(std::size_t n) {
   std::vector<Vec2> ways;
   for (std::size_t k = 0; k < n; ++k) {
-    const auto [s, c] = math::sin_cos(2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(n));
+    const auto [s, c] = math::sin_cos(kTurn * static_cast<double>(k) / static_cast<double>(n));
     ways.emplace_back(c, s);
   }
   return ways;
@@ -44,120 +38,125 @@ std::optional<Vec2> between_tangents(const Vec2& a, const Vec2& out_a, const Vec
   const double turn = cross(out_a, out_b);
   if (!(turn > 1e-6 * out_a.norm() * out_b.norm())) return std::nullopt;
   const double at_a = out_a.dot(a), at_b = out_b.dot(b);
-  const Vec2 x = Vec2(at_a * out_b.y() - at_b * out_a.y(), out_a.x() * at_b - out_b.x() * at_a) / turn;
+  const Vec2 x = meeting_of(out_a, at_a, out_b, at_b);
   if (!(cross(a, x) > 0.0) || !(cross(x, b) > 0.0)) return std::nullopt;
   return x;
 }
 
 }  // namespace
 
-/// Rays from the middle to the rim. Between kinks the pressure along a ray is smooth: what is known of it inside, or beyond the
-/// rim, says where to look next, and never beyond the next kink before that has been looked at.
-bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out) {
-  const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;
+/// Walks begin in the middle, where the pressure and its slope are known. @return the pressure there, 0 where nothing presses or Sigma is no graph
+double PolarRuleSolver::start_walks(PairPressure& pressure, std::span<const Vec2> ways) {
   PressureBatch& batch = rim_batch_;
   batch.resize(1);
-  batch.point[0] = origin;
+  batch.point[0] = frame_.origin;
   pressure.evaluate(batch);
   sheets_.clear();
   for (const implicit::Kink& kink : kinks_) {
     const Sheet sheet = sheet_of(kink);
     if (sheet.told) sheets_.push_back(sheet);
   }
-  const double first = frame_.thickness;
-  double middle = 0.0;  // pressure there
-  {
-    const Vec3 ga = batch.slope_a[0], gb = batch.slope_b[0];
-    const double at = ga.dot(axis), bt = gb.dot(axis), rate = bt - at;
-    if (!(rate > kLeastCosine * (gb - ga).norm())) return false;
-    const double p = (batch.a[0] * bt - batch.b[0] * at) / rate;
-    if (!(p > 0.0)) return false;
-    middle = p;
-    walks_.clear();
-    for (const Vec2& way : ways) {
-      Walk walk;
-      walk.way = way;
-      walk.along = way.x() * u + way.y() * v;
-      walk.pressure = p;
-      walk.slope = (ga.dot(walk.along) * bt - gb.dot(walk.along) * at) / rate;
-      walk.rise = (ga - gb).dot(walk.along) / rate;
-      walk.out = walk.most = kInfinity;
-      walks_.push_back(walk);
-    }
+  const AlongAxis sigma(batch.slope_a[0], batch.slope_b[0], frame_.axis);
+  if (!sigma.upright(kGraphCosine)) return 0.0;
+  const double p = sigma.pressure(batch.a[0], batch.b[0]);
+  walks_.clear();
+  for (const Vec2& way : ways) {
+    Walk walk;
+    walk.way = way;
+    walk.along = frame_.across(way);
+    walk.pressure = p;
+    walk.slope = sigma.slope(walk.along);
+    walk.rise = sigma.rise(walk.along);
+    walk.out = walk.most = kInfinity;
+    walks_.push_back(walk);
   }
-  const auto look_ahead = [&](Walk& walk) {
-    double kink = kInfinity;
-    const auto meet = [&](double r) {
-      if (r > walk.passed * (1.0 + kSameCorner) && r > kFirst && r * walk.along.norm() < 0.5 * extent_) kink = std::min(kink, r);
-    };
-    for (const Sheet& sheet : sheets_) {
-      // The roots of value + along r + square r^2, not numbers where there are none.
-      const double along = sheet.slope.dot(walk.along), square = walk.along.dot(sheet.bend * walk.along);
-      const double half = -0.5 * (along + std::copysign(std::sqrt(along * along - 4.0 * square * sheet.value), along));
-      meet(sheet.value / half);
-      if (square > 0.0) meet(half / square);
-    }
-    const double falls = -walk.slope, square = falls * falls - 2.0 * walk.bend * walk.pressure;
-    double step = falls > 0.0 ? walk.pressure / falls : kInfinity;
-    if (!walk.fresh && walk.bend < 0.0) step = (std::sqrt(square) - falls) / -walk.bend;
-    // Beyond a kink the pressure may begin to fall: a short step tells how.
-    if (walk.fresh && (walk.passed > 0.0 || !(kink < kBeyond))) step = std::min(step, first / walk.along.norm());
-    walk.at = walk.in + step;
-    if (walk.at > kink) walk.at = walk.passed = kink;
+  return p;
+}
+
+/// Where the pressure would be 0 by what is known of it inside, but not beyond the next kink.
+void PolarRuleSolver::look_ahead(Walk& walk) const {
+  double kink = kInfinity;
+  const auto meet = [&](double r) {
+    if (r > walk.passed * (1.0 + kSameCorner) && r > kFirst && r * walk.along.norm() < 0.5 * extent_) kink = std::min(kink, r);
   };
+  for (const Sheet& sheet : sheets_) {
+    // The roots of value + along r + square r^2, not numbers where there are none.
+    const double along = sheet.slope.dot(walk.along), square = walk.along.dot(sheet.bend * walk.along);
+    const double half = -0.5 * (along + std::copysign(std::sqrt(along * along - 4.0 * square * sheet.value), along));
+    meet(sheet.value / half);
+    if (square > 0.0) meet(half / square);
+  }
+  const double falls = -walk.slope, square = falls * falls - 2.0 * walk.bend * walk.pressure;
+  double step = falls > 0.0 ? walk.pressure / falls : kInfinity;
+  if (!walk.fresh && walk.bend < 0.0) step = (std::sqrt(square) - falls) / -walk.bend;
+  // Beyond a kink the pressure may begin to fall: a short step tells how.
+  if (walk.fresh && (walk.passed > 0.0 || !(kink < kBeyond))) step = std::min(step, frame_.thickness / walk.along.norm());
+  walk.at = walk.in + step;
+  if (walk.at > kink) walk.at = walk.passed = kink;
+}
+
+/// Where a walk looks next, or that it is at the rim, from the pressures where it looked.
+void PolarRuleSolver::walk_on(Walk& walk, const AlongAxis& sigma, double a, double b, const WalkEnd& end) {
+  const double lift = sigma.lift(a, b);
+  if (!sigma.upright(kGraphCosine) || !(std::abs(lift) <= kFar * frame_.thickness)) {  // far outside
+    walk.most = 0.5 * (walk.at - walk.in);
+    walk.at = walk.in + walk.most;
+    walk.height = walk.in_height + walk.rise * walk.most;
+    return;
+  }
+  const double p = sigma.pressure(a, b), slope = sigma.slope(walk.along), rise = sigma.rise(walk.along);
+  const double here = walk.at, height = walk.height + lift;
+  if (p > 0.0) {
+    walk.bend = (slope - walk.slope) / (here - walk.in);
+    walk.fresh = here == walk.passed;
+    walk.in = here;
+    walk.in_height = height;
+    walk.pressure = p;
+    walk.slope = slope;
+    walk.rise = rise;
+    walk.most *= 4.0;
+    if (walk.out == kInfinity) {
+      look_ahead(walk);
+    } else {
+      walk.at = slope < 0.0 ? here - p / slope : kInfinity;
+    }
+  } else {
+    walk.out = here;
+    walk.at = slope < 0.0 ? here - p / slope : -kInfinity;
+  }
+  const double step = walk.at - here;
+  const bool to_kink = p > 0.0 && walk.at == walk.passed;  // the rim may lie on either side of it
+  if (std::abs(step) <= end.step * here && std::abs(p) <= end.pressure && slope < 0.0 && !to_kink) {
+    walk.done = true;
+    walk.outward = -Vec2(sigma.slope(frame_.u), sigma.slope(frame_.v));
+    walk.height = height + rise * step;
+    return;
+  }
+  if (walk.out < kInfinity && !(walk.at > walk.in && walk.at < walk.out)) walk.at = 0.5 * (walk.in + walk.out);
+  walk.at = std::min(walk.at, walk.in + walk.most);
+  walk.height = height + rise * (walk.at - here);
+}
+
+/// Rays from the middle to the rim. Between kinks the pressure along a ray is smooth: what is known of it inside, or beyond the
+/// rim, says where to look next, and never beyond the next kink before that has been looked at.
+bool PolarRuleSolver::follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out) {
+  const double middle = start_walks(pressure, ways);
+  if (!(middle > 0.0)) return false;
+  const WalkEnd end{enough, kNear * middle};
+  PressureBatch& batch = rim_batch_;
   for (Walk& walk : walks_) look_ahead(walk);
   std::size_t open = walks_.size();
-  for (int iteration = 0; iteration < kWalkSteps && open > 0; ++iteration) {
+  for (int iteration = 0; iteration < kBracketSteps && open > 0; ++iteration) {
     batch.resize(walks_.size());
     for (std::size_t k = 0; k < walks_.size(); ++k) {
       if (!(walks_[k].at * walks_[k].along.norm() <= extent_)) return false;
-      batch.point[k] = origin + walks_[k].at * walks_[k].along + walks_[k].height * axis;
+      batch.point[k] = frame_.origin + walks_[k].at * walks_[k].along + walks_[k].height * frame_.axis;
     }
     pressure.evaluate(batch);
     for (std::size_t k = 0; k < walks_.size(); ++k) {
-      Walk& walk = walks_[k];
-      if (walk.done) continue;
-      const Vec3 &ga = batch.slope_a[k], &gb = batch.slope_b[k];
-      const double at = ga.dot(axis), bt = gb.dot(axis), rate = bt - at;
-      const double a = batch.a[k], b = batch.b[k], lift = (a - b) / rate;
-      if (!(rate > kLeastCosine * (gb - ga).norm()) || !(std::abs(lift) <= kFar * frame_.thickness)) {  // far outside
-        walk.most = 0.5 * (walk.at - walk.in);
-        walk.at = walk.in + walk.most;
-        walk.height = walk.in_height + walk.rise * walk.most;
-        continue;
-      }
-      const double p = (a * bt - b * at) / rate, slope = (ga.dot(walk.along) * bt - gb.dot(walk.along) * at) / rate;
-      const double here = walk.at, height = walk.height + lift, rise = (ga - gb).dot(walk.along) / rate;
-      if (p > 0.0) {
-        walk.bend = (slope - walk.slope) / (here - walk.in);
-        walk.fresh = here == walk.passed;
-        walk.in = here;
-        walk.in_height = height;
-        walk.pressure = p;
-        walk.slope = slope;
-        walk.rise = rise;
-        walk.most *= 4.0;
-        if (walk.out == kInfinity) {
-          look_ahead(walk);
-        } else {
-          walk.at = slope < 0.0 ? here - p / slope : kInfinity;
-        }
-      } else {
-        walk.out = here;
-        walk.at = slope < 0.0 ? here - p / slope : -kInfinity;
-      }
-      const double step = walk.at - here;
-      const bool to_kink = p > 0.0 && walk.at == walk.passed;  // the rim may lie on either side of it
-      if (std::abs(step) <= enough * here && std::abs(p) <= kNear * middle && slope < 0.0 && !to_kink) {
-        walk.done = true;
-        --open;
-        walk.outward = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);
-        walk.height = height + rise * step;
-        continue;
-      }
-      if (walk.out < kInfinity && !(walk.at > walk.in && walk.at < walk.out)) walk.at = 0.5 * (walk.in + walk.out);
-      walk.at = std::min(walk.at, walk.in + walk.most);
-      walk.height = height + rise * (walk.at - here);
+      if (walks_[k].done) continue;
+      walk_on(walks_[k], {batch.slope_a[k], batch.slope_b[k], frame_.axis}, batch.a[k], batch.b[k], end);
+      if (walks_[k].done) --open;
     }
   }
   if (open > 0) return false;
@@ -182,7 +181,7 @@ bool PolarRuleSolver::follow_rays(PairPressure& pressure) {
 bool PolarRuleSolver::lift_to_sigma(PairPressure& pressure) {
   PressureBatch& batch = rim_batch_;
   batch.resize(1);
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kFreeSteps; ++step) {
     batch.point[0] = frame_.origin;
     pressure.evaluate(batch);
     const double rate = (batch.slope_b[0] - batch.slope_a[0]).dot(frame_.axis);
@@ -197,21 +196,15 @@ bool PolarRuleSolver::lift_to_sigma(PairPressure& pressure) {
 /// The frame goes to the centroid of the outline, with axes in which the outline is as wide as it is long.
 bool PolarRuleSolver::move_to_middle(PairPressure& pressure) {
   const double lu = frame_.u.norm(), lv = frame_.v.norm();
-  double area = 0.0;
-  Vec2 first = Vec2::Zero();
-  Eigen::Matrix2d second = Eigen::Matrix2d::Zero();
+  PolygonMoments moments;
   for (std::size_t k = 0; k < outline_.size(); ++k) {
-    const Vec2& a = outline_[k].at;
-    const Vec2& b = outline_[(k + 1) % outline_.size()].at;
-    const Vec2 p(lu * a.x(), lv * a.y()), q(lu * b.x(), lv * b.y()), sum = p + q;
-    const double half = 0.5 * cross(p, q);
-    if (!(half > 0.0)) return false;
-    area += half;
-    first += half / 3.0 * sum;
-    second += half / 12.0 * (p * p.transpose() + q * q.transpose() + sum * sum.transpose());
+    const Vec2 &a = outline_[k].at, &b = outline_[(k + 1) % outline_.size()].at;
+    const Vec2 p(lu * a.x(), lv * a.y()), q(lu * b.x(), lv * b.y());
+    if (!(cross(p, q) > 0.0)) return false;
+    moments.add_edge(p, q);
   }
-  const Vec2 centre = first / area;
-  second = second / area - centre * centre.transpose();
+  const Vec2 centre = moments.first / moments.area;
+  const Eigen::Matrix2d second = moments.second / moments.area - centre * centre.transpose();
   const Principal axes = principal(second(0, 0), second(0, 1), second(1, 1));
   if (!(axes.second > 0.0)) return false;
   const Vec3 along = frame_.u / lu, across = frame_.v / lv;
@@ -241,7 +234,7 @@ bool PolarRuleSolver::move_off_kinks(PairPressure& pressure) {
     away = std::copysign(kClear - distance, value) / rise.norm() * rise;
   }
   if (least == kClear) return true;
-  frame_.origin += direction(away.x(), away.y());
+  frame_.origin += frame_.across(away);
   return lift_to_sigma(pressure);
 }
 
@@ -251,7 +244,7 @@ void PolarRuleSolver::cross_outline() {
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
     const bool side = kinks_[k].value(frame_.origin) > 0.0;
     const auto other = [&](const RimPoint& p) {
-      return (kinks_[k].value(frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis) > 0.0) != side;
+      return (kinks_[k].value(frame_.place(p.at, p.height)) > 0.0) != side;
     };
     if (std::any_of(outline_.begin(), outline_.end(), other)) crossing_.push_back(k);
   }
@@ -264,54 +257,55 @@ void PolarRuleSolver::follow_tangents() {
   fine_rim_.clear();
   for (std::size_t i = 0; i < n; ++i) {
     const RimPoint &a = outline_[i], &b = outline_[(i + 1) % n];
-    fine_rim_.push_back(frame_.origin + direction(a.at.x(), a.at.y()) + a.height * frame_.axis);
+    fine_rim_.push_back(frame_.place(a.at, a.height));
     if (const std::optional<Vec2> corner = between_tangents(a.at, a.outward, b.at, b.outward)) {
-      fine_rim_.push_back(frame_.origin + direction(corner->x(), corner->y()) + 0.5 * (a.height + b.height) * frame_.axis);
+      fine_rim_.push_back(frame_.place(*corner, 0.5 * (a.height + b.height)));
     }
   }
 }
 
-/// Sectors between corners of the outline, and between others of its points where these are too far apart.
-/// @param widest  as seen from the middle [rad]   @param most_bend  of the outline within one [rad]   @return whether rays through them turn one way
-bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners, double widest, double most_bend) {
-  // A polygon of all points known; of those that lie on one ray, corners are kept.
-  struct Mark {
-    RimPoint point;
-    bool corner;
-    bool strip_before = false, strip_after = false, touch = false;
-    double root_within = 0.0;
-  };
-  std::vector<Mark> all;
+/// Corners and points of the outline by angle; of those that lie on one ray, corners are kept.
+std::vector<PolarRuleSolver::Mark> PolarRuleSolver::mark_outline(std::span<const RimCorner> corners) const {
+  std::vector<Mark> all, marks;
   for (const RimCorner& c : corners) all.push_back({c.point, true, c.strip_before, c.strip_after, false, c.root_within});
   for (const RimPoint& p : outline_) all.push_back({p, false});
   std::stable_sort(all.begin(), all.end(), [](const Mark& a, const Mark& b) { return before(a.point.at, b.point.at); });
-  std::vector<Mark> marks;
-  const auto same = [](const Mark& a, const Mark& b) {
-    return cross(a.point.at, b.point.at) < kSameCorner * a.point.at.norm() * b.point.at.norm() && a.point.at.dot(b.point.at) > 0.0;
-  };
   for (const Mark& mark : all) {
-    if (!marks.empty() && same(marks.back(), mark)) {
+    if (!marks.empty() && on_one_ray(marks.back(), mark)) {
       if (!marks.back().corner) marks.back() = mark;
     } else {
       marks.push_back(mark);
     }
   }
-  if (marks.size() > 1 && same(marks.back(), marks.front())) {
+  if (marks.size() > 1 && on_one_ray(marks.back(), marks.front())) {
     if (!marks.front().corner) marks.front() = marks.back();
     marks.pop_back();
   }
+  return marks;
+}
+
+bool PolarRuleSolver::on_one_ray(const Mark& a, const Mark& b) {
+  return cross(a.point.at, b.point.at) < kSameCorner * a.point.at.norm() * b.point.at.norm() && a.point.at.dot(b.point.at) > 0.0;
+}
+
+/// The point of the edge from a to b that a ray meets.
+PolarRuleSolver::RimPoint PolarRuleSolver::point_between(const RimPoint& a, const RimPoint& b, const Vec2& way) {
+  const double s = cross(a.at, way) / (cross(a.at, way) + cross(way, b.at));
+  return {(1.0 - s) * a.at + s * b.at, (1.0 - s) * a.height + s * b.height, Vec2::Zero()};
+}
+
+/// Adds corners where rays touch imprints.
+void PolarRuleSolver::mark_touches(std::vector<Mark>& marks) const {
   for (const Imprint& imprint : imprints_) {
     for (const Vec2& way : imprint.touches) {
       for (std::size_t k = 0; k < marks.size(); ++k) {
-        const Mark &a = marks[k], &b = marks[(k + 1) % marks.size()];
-        const double beyond = cross(a.point.at, way), left = cross(way, b.point.at);
-        if (!(beyond >= 0.0) || !(left > 0.0)) continue;
-        const double s = beyond / (beyond + left);
-        Mark touch{{(1.0 - s) * a.point.at + s * b.point.at, (1.0 - s) * a.point.height + s * b.point.height, Vec2::Zero()}, true, false, false, true};
-        if (same(a, touch)) {
-          marks[k].corner = marks[k].touch = true;
-        } else if (same(touch, b)) {
-          marks[(k + 1) % marks.size()].corner = marks[(k + 1) % marks.size()].touch = true;
+        Mark &a = marks[k], &b = marks[(k + 1) % marks.size()];
+        if (!(cross(a.point.at, way) >= 0.0) || !(cross(way, b.point.at) > 0.0)) continue;
+        const Mark touch{point_between(a.point, b.point, way), true, false, false, true};
+        if (on_one_ray(a, touch)) {
+          a.corner = a.touch = true;
+        } else if (on_one_ray(touch, b)) {
+          b.corner = b.touch = true;
         } else {
           marks.insert(marks.begin() + static_cast<std::ptrdiff_t>(k + 1), touch);
         }
@@ -319,6 +313,13 @@ bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners, double wi
       }
     }
   }
+}
+
+/// Sectors between corners of the outline, and between others of its points where these are too far apart.
+/// @return whether rays through them turn one way
+bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners) {
+  std::vector<Mark> marks = mark_outline(corners);
+  mark_touches(marks);
   const std::size_t n = marks.size();
   polygon_.clear();
   for (const Mark& mark : marks) polygon_.push_back(mark.point);
@@ -327,28 +328,20 @@ bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners, double wi
   if (begin == n) begin = 0;
   // The point of the polygon in a direction that lies within `count` edges of point `from`.
   const auto along = [&](const Vec2& way, std::size_t from, std::size_t count) {
-    for (std::size_t k = 0; k < count; ++k) {
-      const RimPoint &a = marks[(from + k) % n].point, &b = marks[(from + k + 1) % n].point;
-      if (k + 1 < count && cross(way, b.at) < 0.0) continue;
-      const double s = cross(a.at, way) / (cross(a.at, way) + cross(way, b.at));
-      return RimPoint{(1.0 - s) * a.at + s * b.at, (1.0 - s) * a.height + s * b.height, Vec2::Zero()};
-    }
-    return marks[from].point;
+    std::size_t k = 0;
+    while (k + 1 < count && cross(way, marks[(from + k + 1) % n].point.at) < 0.0) ++k;
+    return point_between(marks[(from + k) % n].point, marks[(from + k + 1) % n].point, way);
   };
   sectors_.clear();
   std::size_t from = 0;
   while (from < n) {
     // As far as the next corner, or as wide as a sector may be.
     std::size_t to = from + 1;
-    double turn = 0.0, bend = 0.0;
+    double turn = 0.0;
     for (;; ++to) {
       const Vec2 &a = marks[(begin + to - 1) % n].point.at, &b = marks[(begin + to) % n].point.at;
       turn += math::atan2(cross(a, b), a.dot(b));
-      if (to > from + 1) {
-        const Vec2 before = a - marks[(begin + to - 2) % n].point.at, edge = b - a;
-        bend += std::abs(math::atan2(cross(before, edge), before.dot(edge)));
-      }
-      if (to > from + 1 && (turn > widest || bend > most_bend)) {
+      if (to > from + 1 && turn > kWidest) {
         --to;
         break;
       }
@@ -357,7 +350,7 @@ bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners, double wi
     const Mark &first = marks[(begin + from) % n], &last = marks[(begin + to) % n];
     const RimPoint &a = first.point, &b = last.point;
     const RimPoint middle = along(0.5 * (a.at + b.at), (begin + from) % n, to - from);
-    const double sharp = kSharp * direction(b.at.x() - a.at.x(), b.at.y() - a.at.y()).norm();
+    const double sharp = kSharp * frame_.across(b.at - a.at).norm();
     sectors_.push_back({{a.at, middle.at, b.at}, {a.height, middle.height, b.height}, first.touch, last.touch,
                         first.strip_after && first.root_within < sharp, last.strip_before && last.root_within < sharp});
     from = to;
@@ -408,9 +401,7 @@ void PolarRuleSolver::place_rays(const KronrodRule& rule, std::size_t first) {
 
 /// @param frame  of any place of the patch   @return false where no kink crosses, or this does not fit
 bool PolarRuleSolver::solve_about_middle(const PolarJob& job, const PeakFrame& frame, PatchPoints& points) {
-  if (!part_about_middle(job.pressure, frame, job.settings)) return false;
-  parted_ = static_cast<std::uint32_t>(crossing_.size());
-  return finish(job.pressure, column_of(job.settings.error), job.regions, job.settings.error, nullptr, points);
+  return part_about_middle(job.pressure, frame, job.settings) && finish_parted(job, points);
 }
 
 bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings) {
@@ -433,7 +424,7 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   find_imprints(pressure);
   cut_ = !third_.empty();
   if (cut_) follow_tangents();  // corners of third bodies are begun there
-  about_middle_ = by_sectors_ = true;
+  about_middle_ = true;
   rise_.setZero();
   const double error = settings.error;
   const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_, third = fine && error >= 1e-6 && !cut_;
@@ -441,11 +432,11 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
     std::vector<RimCorner> corners;
     find_outline_corners(pressure, corners);
     if (crossing_.empty()) return false;
-    if (!make_sectors(corners, kWidest, kInfinity)) return false;
+    if (!make_sectors(corners)) return false;
     start_sectors(error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8, error < kStripsBelow);
     const KronrodRule& first = kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7);
     const std::size_t crossing = crossing_.size();
-    if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr, true)) return false;
+    if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr)) return false;
     if (crossing_.size() == crossing) return true;
     outline_ = kept_rim_;  // they show kinks that the outline did not
     std::sort(outline_.begin(), outline_.end(), [](const RimPoint& a, const RimPoint& b) { return before(a.at, b.at); });

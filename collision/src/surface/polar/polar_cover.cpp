@@ -1,8 +1,8 @@
 #include "surface/polar/polar_cover.h"
 
 #include <cmath>
-#include <numbers>
 
+#include "numbers.h"
 #include "supple/core/math.h"
 
 namespace supple::collision {
@@ -12,7 +12,7 @@ PolarCover::Reach PolarCover::reach(const Vec2& at) const {
   double far = 0.0, height_there = 0.0;  // rho over that of the rim; height of the rim
   if (corner.empty()) {
     const auto n = static_cast<double>(radius.size());
-    double turn = math::atan2(s, c) / (2.0 * std::numbers::pi);
+    double turn = math::atan2(s, c) / (kTurn);
     if (turn < 0.0) turn += 1.0;
     const double place = turn * n;
     const double below = std::floor(place), share = place - below;
@@ -36,7 +36,7 @@ PolarCover::Reach PolarCover::reach(const Vec2& at) const {
 bool PolarCover::contains(const StartPoint& place, double slack) const {
   if (place.across.dot(frame.axis) < 0.0) return false;
   const Vec3 d = place.at - frame.origin;
-  const auto [far, height_there] = reach(Vec2(d.dot(frame.u) / frame.u.squaredNorm(), d.dot(frame.v) / frame.v.squaredNorm()));
+  const auto [far, height_there] = reach(frame.parts_of(d));
   if (far > 1.0 + slack) return false;
   const double up = d.dot(frame.axis), linear = rise.dot(d - up * frame.axis), curved = height_there * far * far - linear * far;
   return std::abs(up - linear - curved) <= 2.0 * thickness + 0.5 * std::abs(height_there);

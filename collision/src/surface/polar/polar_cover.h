@@ -8,8 +8,6 @@
 
 namespace supple::collision {
 
-using Vec2 = Eigen::Vector2d;
-
 struct PolarCover {
   PeakFrame frame;
   std::vector<double> radius, height;  ///< of the rim, by equally spaced angles; of `corner` where there are some

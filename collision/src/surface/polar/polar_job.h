@@ -21,7 +21,7 @@ struct PolarJob {
   double spacing = 0.0;    ///< of the seeds [m]; 0 where there are none
   std::optional<CommonAxis> axis;
   bool faces = false;      ///< the bodies are convex: they may touch with faces, and patches that kinks cross are parted about their middle
-  std::span<const ContactBody* const> third;  ///< bodies that may press harder on the patch: it is cut there
+  Thirds third;  ///< bodies that may press harder on the patch: it is cut there
 };
 
 }  // namespace supple::collision

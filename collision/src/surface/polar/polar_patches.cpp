@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "surface/accuracy.h"
+
 namespace supple::collision {
 namespace {
 
@@ -10,6 +12,7 @@ namespace {
 constexpr double kBesideRim = 0.05;
 
 constexpr std::size_t kMostPatches = 16;
+constexpr int kFootSteps = 6;  // of Newton's method from places of many patches at once
 
 }  // namespace
 
@@ -62,14 +65,14 @@ bool PolarPatches::any_touches(PairPressure& pressure, double extent, bool conve
 }
 
 bool PolarPatches::knows_overlap(PairPressure& pressure) {
-  constexpr double kOutside = -1e-9, kInside = 1e-6;  // pressures over moduli; on a body's own samples its own is nothing but rounding
+  constexpr double kInside = 1e-6;  // pressure over the modulus
   batch_.point.clear();
   for (const StartPoint& place : starts_.inside) batch_.point.push_back(place.at);
   batch_.resize(batch_.point.size());
   pressure.evaluate_values(batch_);
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const double a = batch_.a[i] / pressure.modulus(0), b = batch_.b[i] / pressure.modulus(1);
-    if (std::min(a, b) > kOutside && std::max(a, b) > kInside) return true;
+    if (std::min(a, b) > -kOnSurface && std::max(a, b) > kInside) return true;
   }
   return false;
 }
@@ -151,19 +154,10 @@ std::optional<StartPoint> PolarPatches::outside(PairPressure& pressure, double e
   batch_.resize(batch_.point.size());
   double peak = 0.0;
   for (const PolarCover& cover : covers()) peak = std::max(peak, cover.frame.peak);
-  constexpr int kSteps = 6;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kFootSteps; ++step) {
     pressure.evaluate(batch_);
-    if (step + 1 == kSteps) break;
-    for (std::size_t i = 0; i < batch_.size(); ++i) {
-      const Vec3 slope = batch_.slope_a[i] - batch_.slope_b[i];
-      const double square = slope.squaredNorm();
-      if (!(square > 0.0)) continue;
-      Vec3 move = ((batch_.b[i] - batch_.a[i]) / square) * slope;
-      const double length = move.norm();
-      if (length > extent) move *= extent / length;
-      batch_.point[i] += move;
-    }
+    if (step + 1 == kFootSteps) break;
+    step_to_sigma(batch_, extent);
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const double noise = pressure.noise_on_sigma(batch_.point[i], batch_.slope_a[i].norm(), batch_.slope_b[i].norm());
@@ -178,7 +172,6 @@ std::optional<StartPoint> PolarPatches::outside(PairPressure& pressure, double e
 /// Fills `crossing_`: places near seeds where the surfaces cross, or all but touch, and that belong to no patch. A patch may lie between samples, and
 /// beside a larger one, whose hill then is the only one.
 void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
-  constexpr int kSteps = 6;
   constexpr double kFarthest = 2.0, kLongest = 0.5, kNear = 0.05;  // of the spacing
   crossing_.clear();
   batch_.point.clear();
@@ -189,7 +182,7 @@ void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
     from_.push_back(from);
   };
   for (const StartPoint& place : starts_.beside) keep(place, place.at);
-  for (int step = 0; step < kSteps && !batch_.point.empty(); ++step) {
+  for (int step = 0; step < kFootSteps && !batch_.point.empty(); ++step) {
     batch_.resize(batch_.point.size());
     pressure.evaluate(batch_);
     point_.swap(batch_.point);
@@ -203,7 +196,7 @@ void PolarPatches::find_crossings(PairPressure& pressure, double spacing) {
       // Newton's method to p_A = p_B = 0, the shortest step: normals and distances of both surfaces, to first order.
       const Vec3 normal_a = batch_.slope_a[i] / steep_a, normal_b = batch_.slope_b[i] / steep_b;
       const double off_a = batch_.a[i] / steep_a, off_b = batch_.b[i] / steep_b, c = normal_a.dot(normal_b), square = 1.0 - c * c;
-      if (step + 1 == kSteps) {
+      if (step + 1 == kFootSteps) {
         if (std::max(std::abs(off_a), std::abs(off_b)) <= kNear * spacing) crossing_.push_back({point_[i], across});
         continue;
       }

@@ -1,34 +1,30 @@
 #include "surface/polar/polar_rule.h"
 
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <numeric>
 
+#include "numbers.h"
 #include "supple/core/interrupt.h"
+#include "surface/accuracy.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kLeastCosine = 0.2;     // of Sigma's normal to the axis
 constexpr double kSafety = 5.0;          // a smooth patch needs none; at kinks two rules may agree by chance
 constexpr double kOfLast = 0.3;          // of the estimate of the rule before: the next may agree with it by chance
 constexpr double kOfLastWhereSmooth = 1e-3;
 // What a kink near the rim can do between the nodes of the two coarsest rules of a pair of them.
 constexpr double kUnseenAtFirst = 3e-3, kUnseen = 5e-5;
-constexpr double kEnough = 0.9;          // leaves room for Newton's method
 constexpr double kSplitBelow = 5e-3;  // errors for which kinks matter
 constexpr std::size_t kMostCoarse = 3;   // the finest rule for others
 constexpr double kSafetyAtFirst = 3.0;   // of two rules so coarse, the finer one is a hundred times better on a smooth patch
 constexpr double kSafetyAcross = 2.0;    // where kinks are not parted rules converge by powers: what both differ by is not much above what the finer one is off by
-constexpr int kRimSteps = 30;
 constexpr double kNearRim = 10.0;        // pressure over the peak, by the step over the radius, where Newton's last step to the rim begins: on smooth patches it is 2
 constexpr double kNearRimOfFace = 1.0;   // beside whose edges the slope grows from little to much
 constexpr double kBelowRim = 0.05;       // over the peak
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
 constexpr double kLeastOfEnds = 0.25, kLeastOfFinest = 0.01;  // of what the ends of rays say: errors of deep balls are a seventh and less
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 /// What tells whether rule r is enough where no kink is near; far above what force, area and centre are off by, as energies converge later. Its difference from rule r - 1 says so: both converge exponentially, the
 /// faster the less they differ and the less the rim moved, over its radius, from where the angles of rule r - 1 put it. The forces
@@ -46,6 +42,18 @@ double error_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums&
     case 3: return difference * (0.01 + 5.0 * root + 60.0 * moved);
     default: return difference * (0.02 + 30.0 * root + 200.0 * moved);
   }
+}
+
+/// The same where kinks may cross the patch, unseen by either rule.
+double error_at_kinks(std::size_t r, const PatchSums& fine, const PatchSums& coarse) {
+  const double difference = relative_difference(fine, coarse);
+  return r == 1 ? kSafetyAtFirst * difference + kUnseenAtFirst : kSafety * difference + (r == 2 ? kUnseen : 0.0);
+}
+
+/// The coarsest rule that is asked: fine errors do not ask the coarsest ones of all.
+std::size_t first_rule(double error, bool smooth) {
+  if (smooth) return error < 1e-7 ? 2 : error < 1e-3 ? 1 : 0;
+  return error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < kSplitBelow ? 1 : 0;
 }
 
 }  // namespace
@@ -87,29 +95,41 @@ double PolarRuleSolver::rim_moved() const {
   return moved;
 }
 
-/// @param again  evaluate all rays until the last has ended: estimates on smooth patches take what is left of the way from the pressure at its end
-bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error, bool again) {
+void PolarRuleSolver::start_rim_search(Rays& rays) {
   const std::size_t n = rays.size();
   rim_batch_.resize(n);
   rays.outward.resize(n);
   low_.assign(n, 0.0);
-  high_.assign(n, std::numeric_limits<double>::infinity());
+  high_.assign(n, kInfinity);
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
+  rim_error_ = 0.0;
+  rim_left_.assign(n, 0.0);
+  moved_.assign(n, 0.0);
+}
+
+/// Spreads the columns of both sides as far as the bodies lean away at the rim. @param across  from the axis to the rim   @return false where that is too far
+bool PolarRuleSolver::columns_reach_rim(const AlongAxis& sigma, const Vec3& across) {
+  const double norm_a = sigma.slope_a.norm(), norm_b = sigma.slope_b.norm();
+  if (!(-sigma.up_a > kUpright * norm_a) && !widen_columns(0, sigma.slope_a / -norm_a, across)) return false;
+  return sigma.up_b > kUpright * norm_b || widen_columns(1, sigma.slope_b / -norm_b, across);
+}
+
+/// @param again  evaluate all rays until the last has ended: estimates on smooth patches take what is left of the way from the pressure at its end
+bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error, bool again) {
+  const std::size_t n = rays.size();
+  start_rim_search(rays);
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
   // Beside the edge of a face, where the pressure falls over a small part of the radius, the last step has to be small against that part.
   const double low_enough = (about_middle_ ? kNearRimOfFace : kNearRim) * enough * frame_.peak;
   const Vec3 origin = frame_.origin, axis = frame_.axis, u = frame_.u, v = frame_.v;  // copies, which stay in registers
   const double thickness = frame_.thickness;
-  rim_error_ = 0.0;
-  rim_left_.assign(n, 0.0);
-  moved_.assign(n, 0.0);
   const auto place = [&](std::size_t k) {
     const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
     rim_batch_.point[k] = origin + rays.radius[k] * e + rays.height[k] * axis;
   };
-  for (int iteration = 0; iteration < kRimSteps && !open_.empty(); ++iteration) {
+  for (int iteration = 0; iteration < kBracketSteps && !open_.empty(); ++iteration) {
     heed_scope();
     if (again) {
       for (std::size_t k = 0; k < n; ++k) place(k);
@@ -121,14 +141,9 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
     std::size_t left = 0;
     for (const std::size_t k : open_) {
       const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
-      const Vec3 &ga = rim_batch_.slope_a[k], &gb = rim_batch_.slope_b[k];
-      const double a = rim_batch_.a[k], b = rim_batch_.b[k];
-      const double ar = ga.dot(e), at = ga.dot(axis), br = gb.dot(e), bt = gb.dot(axis);
-      // p where the line along the axis meets Sigma, and its slope along rho on Sigma, to first order.
-      const double rate = bt - at;
-      if (!(rate > kLeastCosine * (gb - ga).norm())) return false;
-      const double on_sigma = (a * bt - b * at) / rate;
-      const double along = (ar * bt - br * at) / rate;
+      const AlongAxis sigma(rim_batch_.slope_a[k], rim_batch_.slope_b[k], axis);
+      if (!sigma.upright(kGraphCosine)) return false;
+      const double a = rim_batch_.a[k], b = rim_batch_.b[k], on_sigma = sigma.pressure(a, b), along = sigma.slope(e);
       double& radius = rays.radius[k];
       // Newton's first steps may stray from Sigma, where the sign of on_sigma says little: they set no bracket.
       if (iteration >= kFreeRimSteps) (on_sigma > 0.0 ? low_[k] : high_[k]) = radius;
@@ -139,17 +154,15 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
         next = std::isfinite(high_[k]) ? 0.5 * (low_[k] + high_[k]) : 1.5 * radius;
       }
       const double step = next - radius;
-      const double lift = ((a - b) + (ar - br) * step) / rate;
+      const double lift = ((a - b) + (sigma.slope_a.dot(e) - sigma.slope_b.dot(e)) * step) / sigma.rate;
       const double last_move = moved_[k];
       moved_[k] = step * step * e.squaredNorm() + lift * lift;
       const bool settled = std::abs(lift) <= enough * std::max(thickness, std::abs(rays.height[k]));
       const bool smooth = !near || !settled || !about_middle_ || std::abs(step) <= enough * enough * radius ||
                           same_side(rim_batch_.point[k], rim_batch_.point[k] + step * e + lift * axis);
       if (near && settled && smooth) {
-        const double norm_a = ga.norm(), norm_b = gb.norm();
-        if (!(-at > kUpright * norm_a) && !widen_columns(0, ga / -norm_a, radius * e)) return false;
-        if (!(bt > kUpright * norm_b) && !widen_columns(1, gb / -norm_b, radius * e)) return false;
-        rays.outward[k] = -Vec2((ga.dot(u) * bt - gb.dot(u) * at) / rate, (ga.dot(v) * bt - gb.dot(v) * at) / rate);
+        if (!columns_reach_rim(sigma, radius * e)) return false;
+        rays.outward[k] = -Vec2(sigma.slope(u), sigma.slope(v));
         // Newton's method leaves about half the square of its last step, which the area feels twice.
         rim_error_ = std::max(rim_error_, step * step / (radius * radius));
         if (last_move > 0.0) rim_left_[k] = std::abs(step) / radius * moved_[k] / last_move;
@@ -180,7 +193,7 @@ void PolarRuleSolver::place_nodes(const PolarRule& rule) {
   foot_.resize(n);
   height_.resize(n);
   weight_.resize(n);
-  const double sector = 2.0 * std::numbers::pi / rule.angular;
+  const double sector = kTurn / rule.angular;
   for (std::size_t k = 0; k < angles; ++k) {
     const double c = rule.cosine[k], s = rule.sine[k], rim = rim_.radius[k];
     const Vec3 e = c * frame_.u + s * frame_.v;
@@ -256,7 +269,7 @@ bool PolarRuleSolver::integrate() {
     const double fall = -slope_a.dot(axis), rise = slope_b.dot(axis);
     const double p = (a * rise + b * fall) / (rise + fall);
     lift = std::max(lift, std::abs(a - b) / (rise + fall));
-    if (!(cosine > kLeastCosine) || !(p > lowest)) return false;
+    if (!(cosine > kGraphCosine) || !(p > lowest)) return false;
     for (std::size_t t = 0; t < thirds; ++t) {
       if (third_value_[t * n + i] > p) weight_[i] = 0.0;
     }
@@ -321,7 +334,7 @@ double PolarRuleSolver::algebraic_error() const { return 2.0 * rim_error_ + plac
 
 bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const Known& known, PatchPoints& points) {
   PairPressure& pressure = job.pressure;
-  const std::span<const ContactBody* const> third = job.third;
+  const Thirds third = job.third;
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   extent_ = 2.0 * job.extent;
   error_ = job.settings.error;
@@ -345,7 +358,7 @@ bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const K
   };
   const bool peaked = !frame.flat;
   const auto [round, follow] = known;
-  if (peaked && !follow && solve_about_peak(job, frame, {.round = round, .star = true}, points)) return true;
+  if (peaked && !follow && solve_about_peak(job, frame, {.round = round}, points)) return true;
   if (job.faces && anew() && solve_about_middle(job, frame, points)) return true;
   if (peaked && anew() && solve_about_star(job, frame, follow, points)) return true;
   if (peaked && !follow && anew() && solve_about_peak(job, frame, {.round = round, .any = true}, points)) return true;
@@ -353,36 +366,33 @@ bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const K
   return false;
 }
 
-bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& frame, const AboutPeak& how, PatchPoints& points) {
-  PairPressure& pressure = job.pressure;
-  const ContactSettings& settings = job.settings;
-  const Regions& regions = job.regions;
-  const bool any = how.any, star = how.star;
-  bool round = how.round;
-  const double error = settings.error;
-  cut_ = false;
-  about_middle_ = by_sectors_ = false;
-  rise_.setZero();
-  spread_ = widest_ = {};
+/// A state without anything known of the patch but its peak.
+void PolarRuleSolver::start_about_peak(const PeakFrame& frame) {
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
+  rise_.setZero();
+  spread_ = widest_ = {};
+  cut_ = about_middle_ = false;
   estimate_ = 1.0;
-  const std::span<const PolarRule> rules = polar_rules();
-  const bool parts = error < kSplitBelow || !third_.empty();
-  // Patches that need more at coarse errors are uneven: there two rules agree by chance.
-  const std::size_t most = parts || !star ? rules.size() - 1 : kMostCoarse;
-  const std::size_t last = std::min<std::size_t>(most, static_cast<std::size_t>(std::max(settings.max_refinement, 1)));
-  // Fine accuracies do not ask the coarsest rules.
-  const auto first_of = [&](bool smooth) {
-    if (smooth) return std::min<std::size_t>(error < 1e-7 ? 2 : error < 1e-3 ? 1 : 0, last - 1);
-    return std::min<std::size_t>(error < 1e-6 ? 3 : error < 1e-5 ? 2 : error < 5e-3 ? 1 : 0, last - 1);
-  };
   parted_ = 0;
   polygon_.clear();
   kinks_.clear();
   all_kinks_ = true;  // where none are looked for
+}
+
+bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& frame, const AboutPeak& how, PatchPoints& points) {
+  PairPressure& pressure = job.pressure;
+  const bool any = how.any;
+  bool round = how.round;
+  const double error = job.settings.error;
+  start_about_peak(frame);
+  const std::span<const PolarRule> rules = polar_rules();
+  const bool parts = error < kSplitBelow || !third_.empty();
+  // Patches that need more at coarse errors are uneven: there two rules agree by chance.
+  const std::size_t most = parts || any ? rules.size() - 1 : kMostCoarse;
+  const std::size_t last = std::min<std::size_t>(most, static_cast<std::size_t>(std::max(job.settings.max_refinement, 1)));
   bool smooth = error < kSplitBelow && third_.empty() && no_kinks_near(pressure);
-  std::size_t first = first_of(smooth);
+  std::size_t first = std::min(first_rule(error, smooth), last - 1);
   double difference = 0.0;
   for (std::size_t r = first; r <= last; ++r) {
     const PolarRule& rule = round ? polar_rays()[r] : rules[r];
@@ -390,7 +400,7 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
     if (!solve_rim(pressure, rim_, error, true)) return false;
     if (smooth && std::any_of(rim_batch_.point.begin(), rim_batch_.point.end(), [this](const Vec3& x) { return !smooth_.contains(x); })) {
       smooth = false;
-      first = first_of(false);
+      first = std::min(first_rule(error, false), last - 1);
       r = first - 1;
       continue;
     }
@@ -405,26 +415,13 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
       r = first - 1;
       continue;
     }
-    if (!third_.empty() && taken_by_thirds()) {
-      fine_ = {};
-      estimate_ = 0.0;
-      thickness_ = frame.thickness;
-      return true;
-    }
-    if (parts && !(any && third_.empty()) && kinks_cross(pressure)) {
-      if (solve_split(pressure, settings)) {
-        parted_ = static_cast<std::uint32_t>(crossing_.size());
-        return finish(pressure, column_of(error), regions, error, nullptr, points);
-      }
-      return false;
-    }
+    if (!third_.empty() && taken_by_thirds()) return leave_all();
+    if (parts && !(any && third_.empty()) && kinks_cross(pressure)) return solve_split(pressure, job.settings) && finish_parted(job, points);
     if (r == first) continue;
     const double last_difference = difference;
-    difference = smooth   ? std::max(error_where_smooth(r, fine_, coarse_, rim_moved()), kOfLastWhereSmooth * last_difference)
-                 : r == 1 ? kSafetyAtFirst * relative_difference(fine_, coarse_) + kUnseenAtFirst
-                          : kSafety * relative_difference(fine_, coarse_) + (r == 2 ? kUnseen : 0.0);
-    if (!parts && r > first + 1) difference = std::max(difference, std::min(kOfLast * last_difference, kEnough * error));
-    if (difference > kEnough * error && r < last) continue;
+    difference = smooth ? std::max(error_where_smooth(r, fine_, coarse_, rim_moved()), kOfLastWhereSmooth * last_difference) : error_at_kinks(r, fine_, coarse_);
+    if (!parts && r > first + 1) difference = std::max(difference, std::min(kOfLast * last_difference, kOfParts * error));
+    if (difference > kOfParts * error && r < last) continue;
     estimate_ = (any ? kSafetyAcross : 1.0) * difference + algebraic_error();
     if (estimate_ > error && !any) return false;
     // Which rule is enough is not asked of this estimate, as energies converge later; but two rules agree by chance where it is far above what they say.
@@ -434,9 +431,23 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
       estimate_ = std::min(std::max(estimate_, least), by_ends);
     }
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
-    return finish(pressure, rules[r].column, regions, error, round ? &rules[r - 1] : nullptr, points);
+    return finish(pressure, rules[r].column, job.regions, error, round ? &rules[r - 1] : nullptr, points);
   }
   return false;
+}
+
+/// A patch that third bodies have all of.
+bool PolarRuleSolver::leave_all() {
+  fine_ = {};
+  estimate_ = 0.0;
+  thickness_ = frame_.thickness;
+  return true;
+}
+
+/// The same as `finish`, of a patch that was parted.
+bool PolarRuleSolver::finish_parted(const PolarJob& job, PatchPoints& points) {
+  parted_ = static_cast<std::uint32_t>(crossing_.size());
+  return finish(job.pressure, column_of(job.settings.error), job.regions, job.settings.error, nullptr, points);
 }
 
 /// Columns, and what was found, to `points`. @param turns  rule whose rays the single one stands for, or null
@@ -484,7 +495,7 @@ void PolarRuleSolver::cover(PolarCover& out) const {
     for (const RimPoint& p : polygon_) {
       out.corner.push_back(p.at);
       out.height.push_back(p.height);
-      out.rim.push_back(frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis);
+      out.rim.push_back(frame_.place(p.at, p.height));
     }
     return;
   }

@@ -13,6 +13,7 @@
 
 #include "supple/collision/contact_surface.h"
 #include "supple/implicit/kinks.h"
+#include "surface/accuracy.h"
 #include "surface/find_peak.h"
 #include "surface/pair_pressure.h"
 #include "surface/patch_points.h"
@@ -60,10 +61,12 @@ class PolarRuleSolver {
   };
   struct AboutPeak {
     bool round = false;
-    bool any = false;   ///< whatever the error, and without regard to kinks of the fields
-    bool star = false;  ///< a rule about a star is tried after this one
+    bool any = false;  ///< whatever the error, and without regard to kinks of the fields; else other rules are tried after this one
   };
   bool solve_about_peak(const PolarJob& job, const PeakFrame& frame, const AboutPeak& how, PatchPoints& points);
+  void start_about_peak(const PeakFrame& frame);
+  void start_rim_search(Rays& rays);
+  bool columns_reach_rim(const AlongAxis& sigma, const Vec3& across);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error, bool again);
   [[nodiscard]] bool same_side(const Vec3& from, const Vec3& to) const;
   [[nodiscard]] double rim_moved() const;
@@ -73,10 +76,18 @@ class PolarRuleSolver {
   bool integrate();
   void keep_along_axis(PatchSums& sums) const;
   void turn(const PolarRule& rule, bool slopes);
+  bool leave_all();
+  bool finish_parted(const PolarJob& job, PatchPoints& points);
   bool finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns, PatchPoints& points);
   // Columns through the squeezed regions: polar_columns.cpp.
   /// Cosine of a body's normal to the columns at the rim: nearer to grazing, they are long beside it.
   static constexpr double kUpright = 0.3;
+  /// The same of a ray, or of a way out of an apex, to what it is to meet: nearer to grazing, it is not followed.
+  static constexpr double kLeastSight = 0.1;
+  /// Where finer rules may find the rim, over its distance as it is known.
+  static constexpr double kBeyondRim = 1.2;
+  /// Angles that differ less are the same [rad]; of searches between two rays, a share of the angle between these, and Newton's method goes on to its square.
+  static constexpr double kSameTurn = 1e-7;
   bool widen_columns(int side, const Vec3& outward, const Vec3& across);
   [[nodiscard]] bool lead_out(int side) const;
   bool add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points);
@@ -94,6 +105,25 @@ class PolarRuleSolver {
   [[nodiscard]] double algebraic_error() const;
   // Estimates on smooth patches: smooth_estimate.cpp.
   [[nodiscard]] double unseen_by_angles(std::size_t r) const;
+  /// Force, first moment, load and area of a density.
+  struct Density {
+    Vec3 force = Vec3::Zero(), first = Vec3::Zero();
+    double load = 0.0, area = 0.0;
+    void add(const Vec3& x, const Vec3& normal, double weight, double pressure) {
+      const double p = weight * pressure;
+      force += p * normal;
+      first += p * x;
+      load += p;
+      area += weight;
+    }
+  };
+  /// Densities of all rays together: at each node along them, and values and slopes at their ends.
+  struct EndedPatch {
+    std::array<Density, 16> along;
+    Density centre, centre_slope, rim, rim_slope;
+    double left = 0.0;  // of the way to the rim, as what it adds to the area over that
+  };
+  [[nodiscard]] EndedPatch end_rays(const GaussRule& gauss) const;
   [[nodiscard]] double estimate_by_ends(std::size_t r, bool round) const;
   [[nodiscard]] bool clear_of_kinks(PairPressure& pressure);
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
@@ -154,12 +184,8 @@ class PolarRuleSolver {
   bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
   bool kinks_cross(PairPressure& pressure);
-  /// Whether a patch is parted at a kink. The fourth power of a rule's points, by which it converges across a jump of a third derivative, is enough to here.
-  [[nodiscard]] bool parts_at(const implicit::Kink& kink) const {
-    constexpr int kThirdDerivative = 3;
-    constexpr double kAcrossIt = 1e-4;  // error
-    return kink.order < kThirdDerivative || error_ < kAcrossIt;
-  }
+  /// Whether a patch is parted at a kink.
+  [[nodiscard]] bool parts_at(const implicit::Kink& kink) const { return !is_mild(kink, error_); }
   [[nodiscard]] double at_rim() const { return kAtRim * error_ * frame_.peak; }
   [[nodiscard]] bool taken_by_thirds();
   bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);
@@ -167,22 +193,51 @@ class PolarRuleSolver {
   void evaluate_thirds(std::span<const Vec3> points);
   [[nodiscard]] double side_of(std::size_t kink, PairPressure& pressure, const Vec3& x);
   [[nodiscard]] double side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const;
+  /// An angle at which panels end.
+  struct Turn {
+    double angle;
+    bool touch;  // a ray touches something there
+  };
+  std::vector<Turn> find_turns(PairPressure& pressure, double error);
   bool solve_split(PairPressure& pressure, const ContactSettings& settings);
   void follow_rim();
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
   template <class Directions>
   std::array<Directions, 2> sum_waves(const Directions& cosine, const Directions& sine) const;
+  /// A kink along a ray: s = value + share (along + square share + mixed rise) + rise (up + up_square rise) of those that tell.
+  struct RaySheet {
+    std::size_t ray, kink;
+    Vec3 reach;  // from the origin to the rim [m]
+    bool told;
+    double value, along, up, square, mixed, up_square;
+  };
+  [[nodiscard]] RaySheet sheet_along(std::size_t ray, std::size_t c, const Vec3& reach) const;
+  double side_on_ray(PairPressure& pressure, const RaySheet& on, double share, double rise);
+  void cross_between(PairPressure& pressure, const RaySheet& on, Interval where, Interval sides, std::size_t others);
+  void guess_crossings(PairPressure& pressure);
   void find_crossings(PairPressure& pressure, double error);
   bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
   void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
   [[nodiscard]] std::optional<Touch> touch_between(std::span<const Crossing> before, std::span<const Crossing> here) const;
   bool add_missed_kinks();
   bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
+  [[nodiscard]] double piece_share(const KronrodRule& rule, std::size_t ray, std::size_t piece, double width) const;
+  void lay_nodes(const KronrodRule& rule, std::size_t ray, int nodes, bool check, double shortest);
   bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
   [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
   static double slow_decay(const Panel& panel, const PatchSums& all);
   void doubt(Panel& panel, const PatchSums& all) const;
+  void start_panels();
+  bool doubt_all();
+  [[nodiscard]] bool leaves_unseen(const Panel& panel) const;
+  /// How a panel becomes finer: by more points on its rays, by being parted.
+  struct Finer {
+    bool more, part;
+  };
+  [[nodiscard]] bool parts_at_changes(const Panel& panel, const Finer& how) const { return how.part && panel.change < panel.change_end && !(about_middle_ && cut_); }
+  void refine_panel(PairPressure& pressure, const Panel& panel, const Finer& how, bool halve, std::vector<Panel>& finer);
+  void gather_panels();
   [[nodiscard]] bool grows_as_root(const Panel& panel) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
@@ -226,6 +281,8 @@ class PolarRuleSolver {
   void meet_kinks(PairPressure& pressure, double close, std::span<KinkOnRay> rays);
   void find_corners_between(PairPressure& pressure, std::span<CornerSearch> searches);
   void add_vertices(std::vector<RimPoint>& rays) const;
+  [[nodiscard]] std::vector<KinkOnRay> kinks_on_rays(PairPressure& pressure);
+  void add_strips(PairPressure& pressure, std::span<const CornerSearch> searches, std::vector<RimCorner>& corners);
   void find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners);
 
   // Rays that touch kinks: touch_kinks.cpp.
@@ -261,17 +318,35 @@ class PolarRuleSolver {
   };
   bool solve_about_middle(const PolarJob& job, const PeakFrame& frame, PatchPoints& points);
   bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings);
+  /// What ends a walk: the step over the distance gone, and the pressure [Pa].
+  struct WalkEnd {
+    double step, pressure;
+  };
+  double start_walks(PairPressure& pressure, std::span<const Vec2> ways);
+  void look_ahead(Walk& walk) const;
+  void walk_on(Walk& walk, const AlongAxis& sigma, double a, double b, const WalkEnd& end);
   bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
   bool follow_rays(PairPressure& pressure);
   bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);
   bool move_off_kinks(PairPressure& pressure);
   void follow_tangents();
-  [[nodiscard]] bool make_sectors(std::span<const RimCorner> corners, double widest, double most_bend);
+  /// A place of the outline where a sector may begin.
+  struct Mark {
+    RimPoint point;
+    bool corner;
+    bool strip_before = false, strip_after = false, touch = false;
+    double root_within = 0.0;
+  };
+  static bool on_one_ray(const Mark& a, const Mark& b);
+  static RimPoint point_between(const RimPoint& a, const RimPoint& b, const Vec2& way);
+  [[nodiscard]] std::vector<Mark> mark_outline(std::span<const RimCorner> corners) const;
+  void mark_touches(std::vector<Mark>& marks) const;
+  [[nodiscard]] bool make_sectors(std::span<const RimCorner> corners);
   void start_sectors(int nodes, bool strips);
   void cross_outline();
   void place_rays(const KronrodRule& rule, std::size_t first);
-  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger, bool look);
+  bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger);
 
   // About a point that sees the whole rim: star_rule.cpp.
   bool solve_about_star(const PolarJob& job, const PeakFrame& frame, bool fine, PatchPoints& points);
@@ -288,11 +363,8 @@ class PolarRuleSolver {
   /// A line from a node through a squeezed region. Where columns spread, X = node + t way, across from the axis by 1 + t spread times as far as the
   /// node, and t has the area of the node's foot times (1 + t spread)(narrow + t spread).
   struct Column {
-    Vec3 way;                       // of length 1 along the axis
-    std::array<double, 3> swept{};  // area across it over the distance along it, a polynomial; over that across the axis
-    [[nodiscard]] double width(double t) const { return swept[0] + t * (swept[1] + t * swept[2]); }
-    [[nodiscard]] double widens(double t) const { return swept[1] + 2.0 * t * swept[2]; }
-    [[nodiscard]] double volume(double t) const { return t * (swept[0] + t * (0.5 * swept[1] + t * swept[2] / 3.0)); }
+    Vec3 way;       // of length 1 along the axis
+    Swept swept{};  // over the area across the axis
   };
 
   PeakFrame frame_;
@@ -328,7 +400,7 @@ class PolarRuleSolver {
   bool may_go_through_ = false;  // one body through the other: not balls and half-spaces, whose surfaces meet in one circle, and not where third bodies press
 
   double error_ = 0.0;                 // asked for
-  std::span<const ContactBody* const> third_;
+  Thirds third_;
   bool cut_ = false;                   // nodes where a third body presses harder do not count
   std::vector<double> third_value_;    // pressures of third bodies at points, one body after the other
   std::vector<Vec3> third_slope_;
@@ -351,10 +423,10 @@ class PolarRuleSolver {
   Rays rays_;
   std::vector<double> linear_, square_, rest_;  // heights along a ray: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest)
   std::vector<Crossing> crossings_;
+  std::vector<std::size_t> first_crossing_;  // of a ray, and their number
   std::vector<Change> changes_;
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
-  bool about_middle_ = false, about_star_ = false;
-  bool by_sectors_ = false;              // rays go through `sectors_`
+  bool about_middle_ = false, about_star_ = false;  // about the middle rays go through `sectors_`
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis; 0 elsewhere
   std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;

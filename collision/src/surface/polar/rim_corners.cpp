@@ -6,26 +6,24 @@
 #include <cmath>
 #include <limits>
 
+#include "numbers.h"
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
-#include "surface/polar/turns.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr int kMeetingSteps = 8, kLiftingSteps = 6, kSearchSteps = 64;
-constexpr int kCornerSteps = 8;          // Newton's method for all three
+constexpr int kSearchSteps = 64;
 constexpr int kDipRounds = 6;
 constexpr double kDip = 0.1;              // of the pressures beside it
-constexpr double kNear = 0.05;            // of the radius
+constexpr double kNearRim = 0.05;         // of the radius
 constexpr double kBeside = 1.0;           // of the way to the next ray: where kinks may meet between two
 constexpr double kParallel = 1e-9;        // sine between kinks that do not meet
 constexpr double kLeastShare = 0.3;       // radius of the rim, as it leads from one ray to the next, over that of such a place
 constexpr double kAside = 1e-3;           // of the radius, to see how the pressure falls beyond an edge
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 constexpr double kMet = 1e-9;             // of the radius, which the step leaves the square of
-constexpr double kSameTurn = 1e-7;        // share of the angle between two rays; Newton's method goes on to its square
 constexpr double kFarthest = 2.0;          // radius of an edge, over that of the rim, at which the pressure is asked
 constexpr double kClose = 1e-4, kRough = 0.1;
 constexpr double kLeastCosine = 0.02;     // of Sigma's normal to the axis
@@ -39,6 +37,15 @@ double nearest_to_zero(double left, double left_rate, double right, double right
   const double root = std::sqrt(square * square - 3.0 * cube * left_rate);
   const double x = -left_rate / (square + side * root), value = left + x * (left_rate + x * (square + x * cube));
   return side * value <= kDip * std::min(side * left, side * right) ? x : kNotANumber;
+}
+
+/// Calls `body` with each ray and the next one that meets the same kink, around the patch. @param rays  by kink and angle
+template <class Rays, class Body>
+void for_neighbours(const Rays& rays, const Body& body) {
+  for (std::size_t first = 0, last = 0; first < rays.size(); first = last) {
+    while (last < rays.size() && rays[last].kink == rays[first].kink) ++last;
+    for (std::size_t i = first; i < last; ++i) body(rays[i], rays[i + 1 < last ? i + 1 : first]);
+  }
 }
 
 }  // namespace
@@ -73,7 +80,7 @@ void PolarRuleSolver::follow_signs(std::span<const double> values, std::vector<d
 void PolarRuleSolver::move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last) {
   batch.resize(batch.point.size());
   last.assign(kink.size(), 0.0);
-  for (int step = 0; step < kCornerSteps; ++step) {
+  for (int step = 0; step < kFreeSteps; ++step) {
     pressure.evaluate(batch);
     evaluate_thirds(batch.point);
     bool moved = false;
@@ -146,7 +153,7 @@ std::optional<double> PolarRuleSolver::corner_between(PairPressure& pressure, st
   std::vector<double> last;
   move_to_corners(pressure, {&kink, 1}, crossing_batch_, last);
   const Vec3 d = crossing_batch_.point[0] - frame_.origin;
-  const Vec2 way(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm());
+  const Vec2 way = frame_.parts_of(d);
   const auto angle = [&](const Vec2& to) {
     const double c = rays_.cosine[ray], s = rays_.sine[ray];
     return math::atan2(c * to.y() - s * to.x(), c * to.x() + s * to.y());
@@ -160,7 +167,7 @@ std::optional<double> PolarRuleSolver::corner_between(PairPressure& pressure, st
 void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span<KinkOnRay> rays) {
   PressureBatch& batch = crossing_batch_;
   const auto place = [&](const KinkOnRay& ray) -> Vec3 {
-    return frame_.origin + ray.radius * direction(ray.way.x(), ray.way.y()) + ray.height * frame_.axis;
+    return frame_.origin + ray.radius * frame_.across(ray.way) + ray.height * frame_.axis;
   };
   std::vector<std::size_t> open;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -169,12 +176,12 @@ void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span
     rays[i].positive = kinks_[rays[i].kink].value(place(rays[i])) > 0.0;
     open.push_back(i);
   }
-  for (int step = 0; step < kLiftingSteps && !open.empty(); ++step) {
+  for (int step = 0; step < kFreeSteps && !open.empty(); ++step) {
     std::erase_if(open, [&](std::size_t i) {
       KinkOnRay& ray = rays[i];
-      const Vec3 along = direction(ray.way.x(), ray.way.y());
+      const Vec3 along = frame_.across(ray.way);
       double move = 0.0;
-      for (int k = 0; k < kMeetingSteps; ++k) {
+      for (int k = 0; k < kFreeSteps; ++k) {
         Vec3 slope;
         const double s = kinks_[ray.kink].value(place(ray), slope);
         move = -s / slope.dot(along);
@@ -194,7 +201,7 @@ void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span
       const Vec3 &a = batch.slope_a[j], &b = batch.slope_b[j], g = a - b;
       Vec3 slope;
       static_cast<void>(kinks_[ray.kink].value(batch.point[j], slope));
-      const Vec3 along = direction(ray.way.x(), ray.way.y()), across = ray.radius * direction(-ray.way.y(), ray.way.x());
+      const Vec3 along = frame_.across(ray.way), across = ray.radius * frame_.across({-ray.way.y(), ray.way.x()});
       const double s_along = slope.dot(along), s_up = slope.dot(frame_.axis), s_across = slope.dot(across);
       const double g_along = g.dot(along), g_up = g.dot(frame_.axis), g_across = g.dot(across), determinant = s_along * g_up - s_up * g_along;
       ray.positive = s_along < 0.0;
@@ -249,12 +256,11 @@ void PolarRuleSolver::find_corners_between(PairPressure& pressure, std::span<Cor
 /// Directions of places near the rim at which two kinks meet: edges that rays meet there are short.
 void PolarRuleSolver::add_vertices(std::vector<RimPoint>& rays) const {
   const std::size_t n = outline_.size();
-  const auto place = [&](const Vec2& at, double height) -> Vec3 { return frame_.origin + direction(at.x(), at.y()) + height * frame_.axis; };
   std::vector<double> distance;  // of each kink from each point of the outline, in ways to the next
   for (const implicit::Kink& kink : kinks_) {
     for (std::size_t i = 0; i < n; ++i) {
       const Vec2 chord = outline_[(i + 1) % n].at - outline_[i].at;
-      distance.push_back(std::abs(kink.value(place(outline_[i].at, outline_[i].height))) / direction(chord.x(), chord.y()).norm());
+      distance.push_back(std::abs(kink.value(frame_.place(outline_[i].at, outline_[i].height))) / frame_.across(chord).norm());
     }
   }
   for (std::size_t j = 0; j < kinks_.size(); ++j) {
@@ -264,14 +270,13 @@ void PolarRuleSolver::add_vertices(std::vector<RimPoint>& rays) const {
         if (!(far(i) <= kBeside) || far(i + n - 1) < far(i) || far(i + 1) <= far(i)) continue;
         Vec2 at = outline_[i].at;
         bool met = false;
-        for (int step = 0; step < kMeetingSteps && !met; ++step) {
+        for (int step = 0; step < kFreeSteps && !met; ++step) {
           Vec3 one, other;
-          const Vec3 x = place(at, outline_[i].height);
+          const Vec3 x = frame_.place(at, outline_[i].height);
           const Vec2 s(kinks_[j].value(x, one), kinks_[k].value(x, other));
           const Vec2 a(one.dot(frame_.u), one.dot(frame_.v)), b(other.dot(frame_.u), other.dot(frame_.v));
-          const double determinant = cross(a, b);
-          if (!(std::abs(determinant) > kParallel * a.norm() * b.norm())) break;
-          const Vec2 move = Vec2(a.y() * s[1] - b.y() * s[0], b.x() * s[0] - a.x() * s[1]) / determinant;
+          if (!(std::abs(cross(a, b)) > kParallel * a.norm() * b.norm())) break;
+          const Vec2 move = meeting_of(a, -s[0], b, -s[1]);
           at += move;
           met = move.norm() <= kMet * at.norm();
         }
@@ -285,15 +290,15 @@ void PolarRuleSolver::add_vertices(std::vector<RimPoint>& rays) const {
   }
 }
 
-/// Where kinks meet the rim, between rays of the outline; those that do cross the patch.
-void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners) {
+/// Where the rays of the outline, and rays between them on which the pressure along a kink comes near to 0, meet the kinks that are near; by kink and angle.
+std::vector<PolarRuleSolver::KinkOnRay> PolarRuleSolver::kinks_on_rays(PairPressure& pressure) {
   std::vector<RimPoint> points = outline_;
   add_vertices(points);
   std::vector<KinkOnRay> all, fresh;
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
     const auto far = [&](const RimPoint& p) {
-      const Vec3 x = frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis;
-      return std::abs(kinks_[k].value(x)) > kinks_[k].change(x, kNear * direction(p.at.x(), p.at.y()).norm());
+      const Vec3 x = frame_.place(p.at, p.height);
+      return std::abs(kinks_[k].value(x)) > kinks_[k].change(x, kNearRim * frame_.across(p.at).norm());
     };
     const bool crosses = std::binary_search(crossing_.begin(), crossing_.end(), k);
     if (!crosses && std::all_of(points.begin(), points.end(), far)) continue;
@@ -302,19 +307,13 @@ void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<R
       fresh.push_back({k, p.at / length, length, p.height});
     }
   }
-  const auto for_neighbours = [&all](const auto& body) {
-    for (std::size_t first = 0, last = 0; first < all.size(); first = last) {
-      while (last < all.size() && all[last].kink == all[first].kink) ++last;
-      for (std::size_t i = first; i < last; ++i) body(all[i], all[i + 1 < last ? i + 1 : first]);
-    }
-  };
   for (int round = 0; round <= kDipRounds && !fresh.empty(); ++round) {
     meet_kinks(pressure, kRough, fresh);
     all.insert(all.end(), fresh.begin(), fresh.end());
     std::stable_sort(all.begin(), all.end(), [](const KinkOnRay& a, const KinkOnRay& b) { return a.kink != b.kink ? a.kink < b.kink : before(a.way, b.way); });
     fresh.clear();
     if (round == kDipRounds) break;
-    for_neighbours([&](const KinkOnRay& ray, const KinkOnRay& next) {
+    for_neighbours(all, [&](const KinkOnRay& ray, const KinkOnRay& next) {
       if (ray.positive != next.positive || !std::isfinite(ray.pressure) || !std::isfinite(next.pressure)) return;
       const double turn = cross(ray.way, next.way), place = nearest_to_zero(ray.pressure, turn * ray.rate, next.pressure, turn * next.rate);
       if (!(place > 0.0 && place < 1.0)) return;
@@ -322,35 +321,23 @@ void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<R
       fresh.push_back({ray.kink, way / way.norm(), ray.rim + place * (next.rim - ray.rim), ray.height, true});
     });
   }
-  // Where the strip beyond an edge all but ends, its width has a kink.
-  for (const KinkOnRay& ray : all) {
-    if (ray.dip && ray.pressure > 0.0) corners.push_back({{ray.radius * ray.way, ray.height, Vec2::Zero()}});
-  }
-  std::vector<CornerSearch> searches;
-  for_neighbours([&](const KinkOnRay& ray, const KinkOnRay& next) {
-    if (ray.positive == next.positive) return;
-    const bool both = std::isfinite(ray.pressure) && std::isfinite(next.pressure);
-    const KinkOnRay& near = ray.pressure > next.pressure ? ray : next;
-    searches.push_back({ray.kink, ray.way, next.way, ray.rim, next.rim, ray.positive, &near == &ray, both ? ray.pressure / (ray.pressure - next.pressure) : 0.5, near.height});
-  });
-  find_corners_between(pressure, searches);
-  std::erase_if(searches, [](const CornerSearch& search) { return !search.at; });
-  for (const CornerSearch& search : searches) {
-    const auto place = std::lower_bound(crossing_.begin(), crossing_.end(), search.kink);
-    if (place == crossing_.end() || *place != search.kink) crossing_.insert(place, search.kink);
-  }
-  // p = slope . x - bend y^2 / 2 at a distance y beyond the edge: on rays, the rim begins as a root where the slope along them is small.
+  return all;
+}
+
+/// Adds corners with what is known of the strips that begin there: p = slope . x - bend y^2 / 2 at a distance y beyond the edge. On rays, the rim begins
+/// as a root where the slope along them is small.
+void PolarRuleSolver::add_strips(PairPressure& pressure, std::span<const CornerSearch> searches, std::vector<RimCorner>& corners) {
   PressureBatch& batch = crossing_batch_;
   batch.resize(2 * searches.size());
   std::vector<Vec3> outward;
   for (std::size_t i = 0; i < searches.size(); ++i) {
     const Vec2& at = *searches[i].at;
-    batch.point[2 * i] = frame_.origin + direction(at.x(), at.y()) + searches[i].height * frame_.axis;
+    batch.point[2 * i] = frame_.place(at, searches[i].height);
     Vec3 slope;
     static_cast<void>(kinks_[searches[i].kink].value(batch.point[2 * i], slope));
     slope -= slope.dot(frame_.axis) * frame_.axis;
-    outward.push_back(std::copysign(1.0 / slope.norm(), slope.dot(direction(at.x(), at.y()))) * slope);
-    batch.point[2 * i + 1] = batch.point[2 * i] + kAside * direction(at.x(), at.y()).norm() * outward[i];
+    outward.push_back(std::copysign(1.0 / slope.norm(), slope.dot(frame_.across(at))) * slope);
+    batch.point[2 * i + 1] = batch.point[2 * i] + kAside * frame_.across(at).norm() * outward[i];
   }
   pressure.evaluate(batch);
   const auto slope_of = [&](std::size_t j) -> Vec3 {  // over steps across the axis, on Sigma
@@ -363,16 +350,39 @@ void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<R
     const CornerSearch& search = searches[i];
     const Vec3 slope = slope_of(2 * i);
     const double aside = (batch.point[2 * i + 1] - batch.point[2 * i]).norm(), bend = (slope - slope_of(2 * i + 1)).dot(outward[i]) / aside;
-    const Vec3 along = direction(search.at->x(), search.at->y()).normalized(), across = frame_.axis.cross(along);
+    const Vec3 along = frame_.across(*search.at).normalized(), across = frame_.axis.cross(along);
     const double falls = slope.dot(along), square = outward[i].dot(along) * outward[i].dot(along);
     const double grows = falls * falls / (2.0 * bend * square * std::abs(slope.dot(across)));
     corners.push_back({{*search.at, search.height, Vec2::Zero()}, search.beyond_left, !search.beyond_left, bend > 0.0 ? grows : kInfinity});
   }
+}
+
+/// Where kinks meet the rim, between rays of the outline; those that do cross the patch.
+void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners) {
+  const std::vector<KinkOnRay> all = kinks_on_rays(pressure);
+  // Where the strip beyond an edge all but ends, its width has a kink.
+  for (const KinkOnRay& ray : all) {
+    if (ray.dip && ray.pressure > 0.0) corners.push_back({{ray.radius * ray.way, ray.height, Vec2::Zero()}});
+  }
+  std::vector<CornerSearch> searches;
+  for_neighbours(all, [&](const KinkOnRay& ray, const KinkOnRay& next) {
+    if (ray.positive == next.positive) return;
+    const bool both = std::isfinite(ray.pressure) && std::isfinite(next.pressure);
+    const KinkOnRay& near = ray.pressure > next.pressure ? ray : next;
+    searches.push_back({ray.kink, ray.way, next.way, ray.rim, next.rim, ray.positive, &near == &ray, both ? ray.pressure / (ray.pressure - next.pressure) : 0.5, near.height});
+  });
+  find_corners_between(pressure, searches);
+  std::erase_if(searches, [](const CornerSearch& search) { return !search.at; });
+  for (const CornerSearch& search : searches) {
+    const auto place = std::lower_bound(crossing_.begin(), crossing_.end(), search.kink);
+    if (place == crossing_.end() || *place != search.kink) crossing_.insert(place, search.kink);
+  }
+  add_strips(pressure, searches, corners);
   std::vector<Corner> found;
   find_corners(pressure, kinks_.size(), found);
   for (const Corner& corner : found) {
     const Vec3 d = corner.at - frame_.origin;
-    corners.push_back({{Vec2(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm()), d.dot(frame_.axis), Vec2::Zero()}});
+    corners.push_back({{frame_.parts_of(d), d.dot(frame_.axis), Vec2::Zero()}});
   }
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <span>
 
+#include "numbers.h"
 #include "supple/core/error.h"
 #include "supple/core/math.h"
 #include "surface/polar/polar_rule.h"
@@ -119,19 +120,6 @@ const EndedSet& ended_rules(std::size_t r, bool round) {
   return all[2 * (r - 1) + (round ? 1 : 0)];
 }
 
-/// Force, first moment, load and area of a density.
-struct Density {
-  Vec3 force = Vec3::Zero(), first = Vec3::Zero();
-  double load = 0.0, area = 0.0;
-  void add(const Vec3& x, const Vec3& normal, double weight, double pressure) {
-    const double p = weight * pressure;
-    force += p * normal;
-    first += p * x;
-    load += p;
-    area += weight;
-  }
-};
-
 }  // namespace
 
 /// What a rim says that equally spaced angles leave out: the share of the order that they take for the mean, from those of lower orders,
@@ -159,56 +147,60 @@ double PolarRuleSolver::unseen_by_angles(std::size_t r) const {
   return std::max(most, r == 1 ? moved * moved : moved * std::sqrt(most));
 }
 
-/// What force, area and centre of pressure of rule r are off by at most on a patch that no kink crosses.
-double PolarRuleSolver::estimate_by_ends(std::size_t r, bool round) const {
-  SUPPLE_EXPECTS(r >= 1 && r <= kFinestJudged);
-  const std::size_t radii = gauss_rule(polar_rules()[r].radial).node.size(), angles = rim_.size();
-  const GaussRule& gauss = gauss_rule(polar_rules()[r].radial);
+/// The densities along rays and at their ends.
+PolarRuleSolver::EndedPatch PolarRuleSolver::end_rays(const GaussRule& gauss) const {
+  const std::size_t radii = gauss.node.size(), angles = rim_.size();
   const Vec3 origin = frame_.origin, axis = frame_.axis;
-  std::array<Density, 16> along;
-  Density centre, centre_slope, rim, rim_slope;
-  const double sector = 2.0 * std::numbers::pi / static_cast<double>(angles);
+  EndedPatch patch;
+  const double sector = kTurn / static_cast<double>(angles);
   const Vec3 steep_u = frame_.u / frame_.u.squaredNorm(), steep_v = frame_.v / frame_.v.squaredNorm();
   double left = 0.0, whole = 0.0;
   for (std::size_t k = 0; k < angles; ++k) {
     for (std::size_t j = 0; j < radii; ++j) {
       const std::size_t i = k * radii + j;
-      along[j].add(node_.point[i] - origin, normal_[i], area_[i], pressure_[i]);
+      patch.along[j].add(node_.point[i] - origin, normal_[i], area_[i], pressure_[i]);
     }
     const double c = rim_.cosine[k], s = rim_.sine[k], radius = rim_.radius[k], scale = sector * radius * radius * jacobian_;
     const Vec3 reach = radius * direction(c, s);
-    centre.add(Vec3::Zero(), axis, scale, frame_.peak);
-    centre_slope.first += scale * frame_.peak * reach;
-    centre_slope.force -= scale * frame_.peak * radius *
-                          ((frame_.height_uu * c + frame_.height_uv * s) * steep_u + (frame_.height_uv * c + frame_.height_vv * s) * steep_v);
+    patch.centre.add(Vec3::Zero(), axis, scale, frame_.peak);
+    patch.centre_slope.first += scale * frame_.peak * reach;
+    patch.centre_slope.force -= scale * frame_.peak * radius *
+                                ((frame_.height_uu * c + frame_.height_uv * s) * steep_u + (frame_.height_uv * c + frame_.height_vv * s) * steep_v);
     // Over the ray, the slope of p on Sigma where the rim was last looked at, and at the last node before it.
-    const auto fall = [&](const Vec3& a, const Vec3& b) {
-      const double at = a.dot(axis), bt = b.dot(axis);
-      return (a.dot(reach) * bt - b.dot(reach) * at) / (bt - at);
-    };
     const std::size_t last = k * radii + radii - 1;
     const Vec3 &a = rim_batch_.slope_a[k], &b = rim_batch_.slope_b[k];
-    const double at = a.dot(axis), bt = b.dot(axis), slope = fall(a, b);
+    const AlongAxis sigma(a, b, axis);
+    const double slope = sigma.slope(reach);
     const double share = (rim_batch_.point[k] - origin).dot(reach) / reach.squaredNorm(), step = 1.0 - share;
-    const double bend = (slope - fall(node_.slope_a[last], node_.slope_b[last])) / (share - gauss.node.back());
-    const double there = (rim_batch_.a[k] * bt - rim_batch_.b[k] * at) / (bt - at);
+    const double bend = (slope - AlongAxis(node_.slope_a[last], node_.slope_b[last], axis).slope(reach)) / (share - gauss.node.back());
+    const double there = sigma.pressure(rim_batch_.a[k], rim_batch_.b[k]);
     const Vec3 across = b - a, normal = across / across.norm(), x = reach + rim_.height[k] * axis;
     const double area = scale / normal.dot(axis), rest = there + step * (slope + 0.5 * bend * step);
-    rim.add(x, normal, area, rest);
-    rim_slope.add(x, normal, area, slope + bend * step);
+    patch.rim.add(x, normal, area, rest);
+    patch.rim_slope.add(x, normal, area, slope + bend * step);
     // What the pressure says is left of the way to the rim, and what the last step across the ray adds by the second derivatives.
     const double lift = std::abs((origin + x - rim_batch_.point[k]).dot(axis)), far = (rim_batch_.point[k] - node_.point[last]).norm();
-    const double turn = ((a - node_.slope_a[last]).norm() * bt - (b - node_.slope_b[last]).norm() * at) / ((bt - at) * far);
+    const double turn = ((a - node_.slope_a[last]).norm() * sigma.up_b - (b - node_.slope_b[last]).norm() * sigma.up_a) / (sigma.rate * far);
     left += 2.0 * radius * radius * (std::abs(rest) + turn * lift * (std::abs(step) * reach.norm() + 0.5 * lift)) / std::abs(slope);
     whole += radius * radius;
   }
+  patch.left = left / whole;
+  return patch;
+}
+
+/// What force, area and centre of pressure of rule r are off by at most on a patch that no kink crosses.
+double PolarRuleSolver::estimate_by_ends(std::size_t r, bool round) const {
+  SUPPLE_EXPECTS(r >= 1 && r <= kFinestJudged);
+  const GaussRule& gauss = gauss_rule(polar_rules()[r].radial);
+  const Vec3 axis = frame_.axis;
+  const EndedPatch patch = end_rays(gauss);
   const EndedSet& rules = ended_rules(r, round);
   std::array<PatchSums, 3> sums;
   for (std::size_t kind = 0; kind < sums.size(); ++kind) {
     // Area has no slope at the rim, which its rule does not ask for.
     const auto sum = [&](const EndedRule& rule, const auto& part) {
-      auto all = (rule.centre * part(centre) + rule.centre_slope * part(centre_slope) + rule.rim * part(rim) + rule.rim_slope * part(rim_slope));
-      for (std::size_t j = 0; j < radii; ++j) all += rule.node[j] * part(along[j]);
+      auto all = (rule.centre * part(patch.centre) + rule.centre_slope * part(patch.centre_slope) + rule.rim * part(patch.rim) + rule.rim_slope * part(patch.rim_slope));
+      for (std::size_t j = 0; j < gauss.node.size(); ++j) all += rule.node[j] * part(patch.along[j]);
       return all;
     };
     PatchSums& to = sums[kind];
@@ -229,7 +221,7 @@ double PolarRuleSolver::estimate_by_ends(std::size_t r, bool round) const {
   }
   const double off = std::max(relative_difference(fine_, sums[Exact]), relative_difference(fine_, sums[General]));
   const double share = r == kFinestJudged ? kShareFinest : kShare;
-  return share * (off + relative_difference(sums[Exact], sums[Less])) + kAngles * unseen_by_angles(r) + kRim * left / whole + 2.0 * placing_error();
+  return share * (off + relative_difference(sums[Exact], sums[Less])) + kAngles * unseen_by_angles(r) + kRim * patch.left + 2.0 * placing_error();
 }
 
 /// Whether certainly no kink crosses the patch, as the fields tell them all. The patch lies within `off` of the convex hull of its peak and of

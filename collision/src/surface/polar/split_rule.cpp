@@ -4,32 +4,28 @@
 /// while the two rules of a panel differ.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <utility>
 
+#include "numbers.h"
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
 
 namespace supple::collision {
 namespace {
 
 constexpr double kWidest = 2.2;          // panel at the beginning [rad]
-constexpr double kWidestCoarse = 2.4;
+constexpr double kWidestCoarse = 2.4;    // the same by the coarser rule of angles
 constexpr double kWidestOfStar = 0.8;    // where no kink parts the patch: its outline is uneven
 constexpr int kMostRadial = 16;
 constexpr double kShort = 0.03;          // share of a ray on which two points are always enough
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
-constexpr double kEnough = 0.9;          // leaves room for that and for Newton's method
 constexpr std::size_t kMostPanels = 48, kMostBesideThirds = 192;  // that the estimate may ask for
-constexpr double kBesideThirds = 4.0;    // rays may touch a third body anywhere on a face, where rules converge slowly
-constexpr double kSameTurn = 1e-7;       // [rad]
 constexpr double kSliversBelow = 1e-6;   // errors at which those between a corner of the rim and the first ray after it matter
 constexpr double kLeastAlong = 0.5;      // cosine between the rim and the line to its next point
-constexpr double kLeastSight = 0.1;      // cosine between a ray and the normal of the rim: nearer to grazing, rays begin elsewhere
 constexpr double kMostChange = 2.0;      // of the radius, over what its slopes say
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 /// Points of the Gauss rule on a piece of a ray, of which there are `radial` on a whole one.
 int nodes_on(int radial, double share) {
@@ -66,11 +62,11 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 /// 46,000 panels of a disc on a box, boxes, capsules, plates and blobs.
 constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
 constexpr double kRound = 6e5;  // times its square
-constexpr double kLeastFine = 0.01, kLeast = 0.008, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
-constexpr double kUnknown = 4.0;  // of either difference, where kinks are not all known
+constexpr double kLeast = 0.01, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
+constexpr double kSlow = 4.0;  // of either difference, where rules converge slowly: rays may touch a third body anywhere on a face, or kinks are not all known
 constexpr double kRegularOnFaces = 2.0;  // times the root of the difference, of the panel itself
 constexpr double kDecayOnFaces = 2.0;    // of panels whose rays meet other kinks from some angle on
-constexpr double kOnFaces = 0.05, kOnFacesUneven = 0.1, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
+constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
 /// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
 constexpr double kRadial = 2.0, kRadialOnFacesFew = 0.15, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
 constexpr std::size_t kFine = 15;  // rays
@@ -85,7 +81,7 @@ bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule,
   for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &linear_, &square_, &rest_}) {
     column->resize(count);
   }
-  if (by_sectors_) {
+  if (about_middle_) {
     place_rays(rule, first);
   } else {
     for (std::size_t i = 0; i < count; ++i) {
@@ -117,6 +113,47 @@ bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule,
   return true;
 }
 
+/// That the number of points of a ray's piece goes by. Only every second ray is checked: those between have no fewer than either neighbour.
+/// @param width  of the piece
+double PolarRuleSolver::piece_share(const KronrodRule& rule, std::size_t ray, std::size_t piece, double width) const {
+  const std::size_t per_panel = rule.node.size(), k = ray % per_panel, pieces = first_crossing_[ray + 1] - first_crossing_[ray];
+  if (rule.gauss_weight[k] > 0.0) return width;
+  double most = width;
+  for (const std::size_t beside : {ray - (k > 0 ? 1 : 0), ray + (k + 1 < per_panel ? 1 : 0)}) {
+    if (beside == ray) continue;
+    const std::size_t begin = first_crossing_[beside], end = first_crossing_[beside + 1];
+    if (end - begin != pieces) return width;
+    const double left = piece > 0 ? crossings_[begin + piece - 1].radius : 0.0, right = piece < pieces ? crossings_[begin + piece].radius : 1.0;
+    most = std::max(most, right - left);
+  }
+  return most;
+}
+
+/// Gauss points on the pieces of a ray between kinks, from the heights of the model, which is moved to where the kinks are met.
+/// @param nodes  on a ray without kinks   @param check  those of the rule to compare with   @param shortest  piece
+void PolarRuleSolver::lay_nodes(const KronrodRule& rule, std::size_t ray, int nodes, bool check, double shortest) {
+  const std::size_t k = ray % rule.node.size(), begin = first_crossing_[ray], end = first_crossing_[ray + 1];
+  const double rim = rays_.radius[ray], angle = check ? rule.gauss_weight[k] : rule.weight[k];
+  const Vec3 e = direction(rays_.cosine[ray], rays_.sine[ray]);
+  double left = 0.0, lift_left = 0.0;
+  for (std::size_t c = begin; c <= end; ++c) {
+    const double right = c < end ? crossings_[c].radius : 1.0;
+    const double lift_right = c < end ? crossings_[c].height - model_height(ray, right) : 0.0;
+    if (c < end && (right - left < shortest || 1.0 - right < shortest)) continue;
+    // On faces it is the short last piece on which the pressure falls.
+    const int all = about_middle_ ? nodes : nodes_on(nodes, piece_share(rule, ray, c - begin, right - left));
+    const GaussRule& gauss = gauss_rule(!check ? all : about_middle_ ? check_on_faces(all) : check_of(all));
+    for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+      const double along = gauss.node[j], r = left + (right - left) * along;
+      foot_.push_back(frame_.origin + (r * rim) * e);
+      height_.push_back(model_height(ray, r) + lift_left + along * (lift_right - lift_left));
+      weight_.push_back(angle * turn_[ray] * gauss.weight[j] * (right - left) * rim * rim * r * jacobian_);
+    }
+    left = right;
+    lift_left = lift_right;
+  }
+}
+
 /// Sums of the panels from `first` on, whose rays are known.
 bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
   const std::size_t per_panel = rule.node.size(), count = rays_.size();
@@ -132,58 +169,20 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   find_changes(pressure, rule, first);
   const double shortest = shortest_piece(error, about_middle_);
   std::erase_if(crossings_, [&](const Crossing& x) { return x.radius < shortest || x.radius > 1.0 - shortest; });
-
+  first_crossing_.assign(count + 1, 0);
+  for (const Crossing& x : crossings_) ++first_crossing_[x.ray + 1];
+  std::partial_sum(first_crossing_.begin(), first_crossing_.end(), first_crossing_.begin());
   foot_.clear();
   height_.clear();
   weight_.clear();
   ray_nodes_.clear();
   ray_check_.clear();
-  std::vector<std::size_t> first_crossing(count + 1, 0);
-  for (const Crossing& x : crossings_) ++first_crossing[x.ray + 1];
-  std::partial_sum(first_crossing.begin(), first_crossing.end(), first_crossing.begin());
-  // That a piece's number of points goes by. Only every second ray is checked: those between have no fewer than either neighbour.
-  const auto share_of = [&](std::size_t ray, std::size_t piece, double width) {
-    const std::size_t k = ray % per_panel, pieces = first_crossing[ray + 1] - first_crossing[ray];
-    if (rule.gauss_weight[k] > 0.0) return width;
-    double most = width;
-    for (const std::size_t beside : {ray - (k > 0 ? 1 : 0), ray + (k + 1 < per_panel ? 1 : 0)}) {
-      if (beside == ray) continue;
-      const std::size_t begin = first_crossing[beside], end = first_crossing[beside + 1];
-      if (end - begin != pieces) return width;
-      const double left = piece > 0 ? crossings_[begin + piece - 1].radius : 0.0, right = piece < pieces ? crossings_[begin + piece].radius : 1.0;
-      most = std::max(most, right - left);
-    }
-    return most;
-  };
   for (std::size_t i = 0; i < count; ++i) {
-    const Panel& panel = panels_[first + i / per_panel];
-    const double rim = rays_.radius[i];
-    const Vec3 e = direction(rays_.cosine[i], rays_.sine[i]);
-    const std::size_t crossing_begin = first_crossing[i], next = first_crossing[i + 1];
-    const auto nodes = [&](bool check, double angle) {
-      double left = 0.0, lift_left = 0.0;
-      for (std::size_t c = crossing_begin; c <= next; ++c) {
-        const double right = c < next ? crossings_[c].radius : 1.0;
-        const double lift_right = c < next ? crossings_[c].height - model_height(i, right) : 0.0;
-        if (c < next && (right - left < shortest || 1.0 - right < shortest)) continue;
-        // On faces it is the short last piece on which the pressure falls.
-        const int all = about_middle_ ? panel.nodes
-                                      : nodes_on(panel.nodes, share_of(i, c - crossing_begin, right - left));
-        const GaussRule& gauss = gauss_rule(!check ? all : about_middle_ ? check_on_faces(all) : check_of(all));
-        for (std::size_t j = 0; j < gauss.node.size(); ++j) {
-          const double along = gauss.node[j], r = left + (right - left) * along;
-          foot_.push_back(frame_.origin + (r * rim) * e);
-          height_.push_back(model_height(i, r) + lift_left + along * (lift_right - lift_left));
-          weight_.push_back(angle * turn_[i] * gauss.weight[j] * (right - left) * rim * rim * r * jacobian_);
-        }
-        left = right;
-        lift_left = lift_right;
-      }
-    };
+    const int nodes = panels_[first + i / per_panel].nodes;
     ray_nodes_.push_back(foot_.size());
-    nodes(false, rule.weight[i % per_panel]);
+    lay_nodes(rule, i, nodes, false, shortest);
     ray_check_.push_back(foot_.size());
-    if (rule.gauss_weight[i % per_panel] > 0.0) nodes(true, rule.gauss_weight[i % per_panel]);
+    if (rule.gauss_weight[i % per_panel] > 0.0) lay_nodes(rule, i, nodes, true, shortest);
   }
   ray_nodes_.push_back(foot_.size());
   node_.resize(foot_.size());
@@ -288,15 +287,15 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
   panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
   if (about_middle_ && cut_) {
-    const double share = kBesideThirds * (panel.halved ? kHalf : 1.0);
+    const double share = kSlow * (panel.halved ? kHalf : 1.0);
     panel.by_angle *= share;
     panel.by_radius *= share;
     return;
   }
   if (!all_kinks_) {
     // Some may cross any panel, where rules converge slowly.
-    panel.by_angle = std::max(kUnknown * panel.by_angle, slow_decay(panel, all));
-    panel.by_radius *= kUnknown;
+    panel.by_angle = std::max(kSlow * panel.by_angle, slow_decay(panel, all));
+    panel.by_radius *= kSlow;
     return;
   }
   // Over the panel itself: what differs so much is not the last digit of a rule that converges.
@@ -309,12 +308,12 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   if (!panel.even()) {
     const auto changes = static_cast<double>(panel.change_end - panel.change);
     const double decay = about_middle_ ? std::min(kDecayOnFaces * slow_decay(panel, all), kHalf * panel.by_angle) : 0.0;
-    panel.by_angle *= panel.lost ? kLost : about_middle_ ? std::max(on_faces, kOnFacesUneven) : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
+    panel.by_angle *= panel.lost ? kLost : about_middle_ ? std::max(on_faces, kOnFacesHalved) : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
     panel.by_angle = std::max(panel.by_angle, decay);
   } else {
     const double root = std::sqrt(panel.by_angle);
     if (fine) {
-      panel.by_angle *= std::clamp(kRegular * root, cut_ ? kLeastHalved : kLeastFine, 1.0);
+      panel.by_angle *= std::clamp(kRegular * root, cut_ ? kLeastHalved : kLeast, 1.0);
     } else {
       // Rays nearly touch kinks that are round.
       const bool flat = std::all_of(sheets_.begin(), sheets_.end(), [](const Sheet& sheet) { return sheet.flat; });
@@ -332,6 +331,42 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   panel.by_radius *= panel.lost ? kHalf : fine ? kRadialOnFacesFine : std::clamp(slow, panel.nodes <= kFewOnFaces ? kRadialOnFacesFew : kRadialOnFaces, kHalf);
 }
 
+/// Angles at which panels end, as there the integral along a ray is not smooth: where kinks meet the rim, and where rays touch kinks or imprints. The first
+/// one comes again at the end, a whole turn later.
+std::vector<PolarRuleSolver::Turn> PolarRuleSolver::find_turns(PairPressure& pressure, double error) {
+  std::vector<Corner> corners;
+  find_corners(pressure, 0, corners);
+  std::vector<Turn> turns;
+  const auto add = [&turns](const Vec2& way, bool touch) {
+    const double turn = math::atan2(way.y(), way.x());
+    turns.push_back({turn < 0.0 ? turn + kTurn : turn, touch});
+  };
+  for (const Corner& corner : corners) add(frame_.parts_of(corner.at - frame_.origin), false);
+  if (error < kSliversBelow) {
+    std::vector<double> hidden;
+    find_hidden_touches(pressure, corners, hidden);
+    for (const double angle : hidden) turns.push_back({angle < 0.0 ? angle + kTurn : angle, true});
+  }
+  for (const Imprint& imprint : imprints_) {
+    for (const Vec2& way : imprint.touches) add(way, true);
+  }
+  if (turns.empty()) turns.push_back({0.0, false});
+  std::sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return a.angle < b.angle; });
+  // Of those that are the same one stays, so that panels leave nothing out between them.
+  std::size_t last = 0;
+  for (const Turn& turn : turns) {
+    if (turn.angle - turns[last].angle >= kSameTurn) {
+      turns[++last] = turn;
+    } else {
+      turns[last].touch |= turn.touch;
+    }
+  }
+  if (last > 0 && turns.front().angle + kTurn - turns[last].angle < kSameTurn) turns.front().touch |= turns[last--].touch;
+  turns.resize(last + 1);
+  turns.push_back({turns.front().angle + kTurn, turns.front().touch});
+  return turns;
+}
+
 bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
   const double error = settings.error;
   cut_ = !crossing_.empty() && crossing_.back() >= kinks_.size();
@@ -339,45 +374,9 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
   const int radial = error >= 1e-3 ? 3 : !fine ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 10;
   const double widest = about_star_ && crossing_.empty() ? kWidestOfStar : fine ? kWidest : kWidestCoarse;
-  about_middle_ = by_sectors_ = false;
+  about_middle_ = false;
   for (;;) {
-    std::vector<Corner> corners;
-    find_corners(pressure, 0, corners);
-    struct Turn {
-      double angle;
-      bool touch;
-    };
-    std::vector<Turn> turns;
-    const auto add = [&](double x, double y, bool touch) {
-      const double turn = math::atan2(y, x);
-      turns.push_back({turn < 0.0 ? turn + kTurn : turn, touch});
-    };
-    for (const Corner& corner : corners) {
-      const Vec3 d = corner.at - frame_.origin;
-      add(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm(), false);
-    }
-    if (error < kSliversBelow) {
-      std::vector<double> hidden;
-      find_hidden_touches(pressure, corners, hidden);
-      for (const double angle : hidden) turns.push_back({angle < 0.0 ? angle + kTurn : angle, true});
-    }
-    for (const Imprint& imprint : imprints_) {
-      for (const Vec2& x : imprint.touches) add(x.x(), x.y(), true);
-    }
-    if (turns.empty()) turns.push_back({0.0, false});
-    std::sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return a.angle < b.angle; });
-    // Of those that are the same one stays, so that panels leave nothing out between them.
-    std::size_t last = 0;
-    for (const Turn& turn : turns) {
-      if (turn.angle - turns[last].angle >= kSameTurn) {
-        turns[++last] = turn;
-      } else {
-        turns[last].touch |= turn.touch;
-      }
-    }
-    if (last > 0 && turns.front().angle + kTurn - turns[last].angle < kSameTurn) turns.front().touch |= turns[last--].touch;
-    turns.resize(last + 1);
-    turns.push_back({turns.front().angle + kTurn, turns.front().touch});
+    const std::vector<Turn> turns = find_turns(pressure, error);
     panels_.clear();
     for (std::size_t t = 0; t + 1 < turns.size(); ++t) {
       const double width = turns[t + 1].angle - turns[t].angle;
@@ -393,7 +392,7 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
       }
     }
     const std::size_t crossing = crossing_.size();
-    if (!solve_all_panels(pressure, settings, rule, nullptr, true)) return false;
+    if (!solve_all_panels(pressure, settings, rule, nullptr)) return false;
     if (crossing_.size() == crossing) return true;
   }
 }
@@ -403,7 +402,7 @@ bool PolarRuleSolver::add_missed_kinks() {
   const std::size_t crossing = crossing_.size();
   std::vector<double> sides(kept_rim_.size()), places;
   fine_rim_.clear();
-  for (const RimPoint& p : kept_rim_) fine_rim_.push_back(frame_.origin + direction(p.at.x(), p.at.y()) + p.height * frame_.axis);
+  for (const RimPoint& p : kept_rim_) fine_rim_.push_back(frame_.place(p.at, p.height));
   for (std::size_t k = 0; k < kinks_.size(); ++k) {
     if (!parts_at(kinks_[k]) || std::find(crossing_.begin(), crossing_.end(), k) != crossing_.end()) continue;
     for (std::size_t i = 0; i < sides.size(); ++i) sides[i] = kinks_[k].value(fine_rim_[i]);
@@ -418,19 +417,14 @@ bool PolarRuleSolver::add_missed_kinks() {
 
 /// Whether a strip beyond an edge begins at one of a panel's ends, as the root of the angle.
 bool PolarRuleSolver::grows_as_root(const Panel& panel) const {
-  if (!by_sectors_) return false;
+  if (!about_middle_) return false;
   const double whole = std::floor(panel.begin);
   const Sector& sector = sectors_[static_cast<std::size_t>(whole)];
   return (sector.strip_begin && !panel.touch_begin && panel.begin == whole) || (sector.strip_end && !panel.touch_end && panel.end == whole + 1.0);
 }
 
-/// Halves panels until the estimate is low enough; then nodes and sums of all are in place, unless `crossing_` grew.
-/// @param larger  rule that panels get before they are halved, or null
-/// @param look  whether kinks that cross the rim of all rays are added
-bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first,
-                                       const KronrodRule* larger, bool look) {
-  const KronrodRule* rule = &first;
-  const double error = settings.error;
+/// Forgets the nodes of panels, and what they were off by.
+void PolarRuleSolver::start_panels() {
   kept_.resize(0);
   kept_weight_.clear();
   kept_area_.clear();
@@ -440,73 +434,57 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
   changes_.clear();
   residual_ = lift_ = below_ = rim_error_ = 0.0;
   spread_ = widest_ = {};
-  std::size_t begin = 0, solved = panels_.size();
+}
+
+/// The estimate, of the whole and of each panel. @return false where nothing presses
+bool PolarRuleSolver::doubt_all() {
   PatchSums all;
-  const bool beside = about_middle_ && cut_;
-  const std::size_t most = beside ? kMostBesideThirds : kMostPanels;
-  for (;;) {
-    if (begin < panels_.size()) {
-      if (!find_rays(pressure, *rule, error, begin)) return false;
-      if (begin == 0 && look && add_missed_kinks()) return true;
-      if (!solve_panels(pressure, *rule, error, begin)) return false;
-    }
-    all = {};
-    for (const Panel& panel : panels_) all.add(panel.fine);
-    if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
-    estimate_ = below_ / all.load;
-    rim_error_ = 0.0;
-    for (Panel& panel : panels_) {
-      doubt(panel, all);
-      estimate_ += panel.by_angle + panel.by_radius;
-      rim_error_ += panel.by_rim * panel.fine.area / all.area;
-    }
-    // Rules agree by chance where panels do not begin at the rim's corners.
-    const auto unseen = [&](const Panel& panel) { return panel.leaves && !panel.halved && panel.rays >= kFine && !beside; };
-    const bool enough = estimate_ <= kEnough * error;
-    if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= most) break;
-    // New ones go to the end; the angles are put in order when all is done.
-    const auto count = static_cast<double>(panels_.size());
-    const double share = 0.5 * error / count;
-    std::vector<Panel> finer;
-    bool by_angle = false;
-    std::erase_if(panels_, [&](Panel& panel) {
-      const bool more = !enough && panel.by_radius > share && panel.nodes < kMostRadial;
-      const bool part = (!enough && panel.by_angle > share) || unseen(panel);
-      if (!more && !part) return false;
-      Panel next;
-      next.nodes = more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
-      next.begin = panel.begin;
-      const auto end_at = [&](double place, bool touch) {
-        if (!(place - next.begin > kSameTurn) || !(panel.end - place > kSameTurn)) return;
-        next.end = place;
-        next.touch_end = touch;
-        finer.push_back(next);
-        next.begin = next.end;
-        next.touch_begin = touch;
-      };
-      next.touch_begin = panel.touch_begin;
-      next.halved = panel.halved || (part && (larger == nullptr || unseen(panel)));
-      if (part && panel.change < panel.change_end && !beside) {
-        for (std::size_t c = panel.change; c < panel.change_end; ++c) {
-          const std::optional<double> touch = changes_[c].touch ? touching_angle(pressure, *changes_[c].touch) : std::nullopt;
-          end_at(touch.value_or(changes_[c].place), touch.has_value());
-        }
-      } else if (part && larger == nullptr) {
-        end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end), false);
-      } else {
-        by_angle = by_angle || part;
-      }
-      next.end = panel.end;
-      next.touch_end = panel.touch_end;
-      finer.push_back(next);
-      return true;
-    });
-    if (finer.empty()) break;
-    if (larger != nullptr && by_angle) rule = std::exchange(larger, nullptr);
-    begin = panels_.size();
-    solved += finer.size();
-    panels_.insert(panels_.end(), finer.begin(), finer.end());
+  for (const Panel& panel : panels_) all.add(panel.fine);
+  if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
+  estimate_ = below_ / all.load;
+  rim_error_ = 0.0;
+  for (Panel& panel : panels_) {
+    doubt(panel, all);
+    estimate_ += panel.by_angle + panel.by_radius;
+    rim_error_ += panel.by_rim * panel.fine.area / all.area;
   }
+  return true;
+}
+
+/// Whether rules may agree by chance, as the panel does not begin at the rim's corners.
+bool PolarRuleSolver::leaves_unseen(const Panel& panel) const { return panel.leaves && !panel.halved && panel.rays >= kFine && !(about_middle_ && cut_); }
+
+/// Appends to `finer` what takes the place of a panel: with more points on its rays, and parted where these change, or halved.
+/// @param halve  whether it is halved where nothing changes
+void PolarRuleSolver::refine_panel(PairPressure& pressure, const Panel& panel, const Finer& how, bool halve, std::vector<Panel>& finer) {
+  Panel next;
+  next.nodes = how.more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
+  next.begin = panel.begin;
+  const auto end_at = [&](double place, bool touch) {
+    if (!(place - next.begin > kSameTurn) || !(panel.end - place > kSameTurn)) return;
+    next.end = place;
+    next.touch_end = touch;
+    finer.push_back(next);
+    next.begin = next.end;
+    next.touch_begin = touch;
+  };
+  next.touch_begin = panel.touch_begin;
+  next.halved = panel.halved || (how.part && (halve || leaves_unseen(panel)));
+  if (parts_at_changes(panel, how)) {
+    for (std::size_t c = panel.change; c < panel.change_end; ++c) {
+      const std::optional<double> touch = changes_[c].touch ? touching_angle(pressure, *changes_[c].touch) : std::nullopt;
+      end_at(touch.value_or(changes_[c].place), touch.has_value());
+    }
+  } else if (how.part && halve) {
+    end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end), false);
+  }
+  next.end = panel.end;
+  next.touch_end = panel.touch_end;
+  finer.push_back(next);
+}
+
+/// Puts the kept nodes, sums and points of the rim of all panels in their order.
+void PolarRuleSolver::gather_panels() {
   std::sort(panels_.begin(), panels_.end(), [](const Panel& a, const Panel& b) { return a.begin < b.begin; });
   node_.resize(0);
   weight_.clear();
@@ -526,7 +504,45 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
                        kept_rim_.begin() + static_cast<std::ptrdiff_t>(panel.rim_end));
   }
   kept_rim_.swap(sorted_rim_);
-  if (look && add_missed_kinks()) return true;
+}
+
+/// Halves panels until the estimate is low enough; then nodes and sums of all are in place, unless `crossing_` grew by kinks that the rim shows.
+/// @param larger  rule that panels get before they are halved, or null
+bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger) {
+  const KronrodRule* rule = &first;
+  const double error = settings.error;
+  start_panels();
+  std::size_t begin = 0, solved = panels_.size();
+  const std::size_t most = about_middle_ && cut_ ? kMostBesideThirds : kMostPanels;
+  for (;;) {
+    if (begin < panels_.size()) {
+      if (!find_rays(pressure, *rule, error, begin)) return false;
+      if (begin == 0 && add_missed_kinks()) return true;
+      if (!solve_panels(pressure, *rule, error, begin)) return false;
+    }
+    if (!doubt_all()) return false;
+    const auto unseen = [this](const Panel& panel) { return leaves_unseen(panel); };
+    const bool enough = estimate_ <= kOfParts * error;
+    if ((enough && std::none_of(panels_.begin(), panels_.end(), unseen)) || solved >= most) break;
+    // New ones go to the end; the angles are put in order when all is done.
+    const double share = kOfKept * error / static_cast<double>(panels_.size());
+    std::vector<Panel> finer;
+    bool by_angle = false;
+    std::erase_if(panels_, [&](const Panel& panel) {
+      const Finer how{!enough && panel.by_radius > share && panel.nodes < kMostRadial, (!enough && panel.by_angle > share) || unseen(panel)};
+      if (!how.more && !how.part) return false;
+      by_angle = by_angle || (how.part && !parts_at_changes(panel, how));
+      refine_panel(pressure, panel, how, larger == nullptr, finer);
+      return true;
+    });
+    if (finer.empty()) break;
+    if (larger != nullptr && by_angle) rule = std::exchange(larger, nullptr);
+    begin = panels_.size();
+    solved += finer.size();
+    panels_.insert(panels_.end(), finer.begin(), finer.end());
+  }
+  gather_panels();
+  if (add_missed_kinks()) return true;
   if (!about_middle_) {
     if (!rim_joins(0, kept_rim_.size(), true)) return false;
     polygon_ = kept_rim_;

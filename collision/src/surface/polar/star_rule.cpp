@@ -7,22 +7,19 @@
 #include <cmath>
 
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
-#include "surface/polar/turns.h"
 
 namespace supple::collision {
 namespace {
 
 constexpr double kWalk = 0.25;          // first step to the rim, in radii of the peak
 constexpr int kWalkSteps = 200;
-constexpr int kRimSteps = 8;            // Newton's method
 constexpr std::size_t kMostPoints = 400;
 constexpr double kLongest = 0.5, kLongestFine = 0.1, kShortest = 1e-3;  // steps along the rim, in radii
 constexpr double kMostTurn = 0.35, kLittleTurn = 0.15;  // of the rim within a step [rad]
 constexpr double kClose = 1e-3;         // of Newton's method at the rim, in steps
-constexpr double kLeastCosine = 0.2;    // of Sigma's normal to the axis
-constexpr double kLeastSight = 0.01;    // distance of the centre from all tangents of the rim, over the radius of the patch
-constexpr double kMargin = 1.2;         // beyond the points of the rim
+constexpr double kLeastClearance = 0.01;    // distance of the centre from all tangents of the rim, over the radius of the patch
 
 }  // namespace
 
@@ -31,7 +28,7 @@ constexpr double kMargin = 1.2;         // beyond the points of the rim
 bool PolarRuleSolver::move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent, double step) {
   PressureBatch& batch = rim_batch_;
   batch.resize(1);
-  for (int iteration = 0; iteration < kRimSteps; ++iteration) {
+  for (int iteration = 0; iteration < kFreeSteps; ++iteration) {
     batch.point[0] = x;
     pressure.evaluate(batch);
     const Vec3 &a = batch.slope_a[0], &b = batch.slope_b[0];
@@ -64,7 +61,7 @@ bool PolarRuleSolver::walk_to_rim(PairPressure& pressure, const Vec3& along, dou
       pressure.evaluate(batch);
       const Vec3 across = batch.slope_b[0] - batch.slope_a[0];
       const double rate = across.dot(axis);
-      if (!(rate > kLeastCosine * across.norm())) return false;
+      if (!(rate > kGraphCosine * across.norm())) return false;
       const double lift = (batch.a[0] - batch.b[0]) / rate;
       if (!(std::abs(lift) <= extent_)) return false;
       p = (batch.a[0] * batch.slope_b[0].dot(axis) - batch.b[0] * batch.slope_a[0].dot(axis)) / rate;
@@ -148,7 +145,7 @@ std::optional<Vec2> PolarRuleSolver::point_that_sees(std::span<const Vec2> polyg
   }
   if (!(area > 0.0)) return std::nullopt;
   const Vec2 centre = first / area;
-  const double least = kLeastSight * (high - low).norm();
+  const double least = kLeastClearance * (high - low).norm();
   for (std::size_t i = 0; i < n; ++i) {
     const Vec2 edge = polygon[(i + 1) % n] - polygon[i];
     if (!(cross(edge, centre - polygon[i]) > least * edge.norm())) return std::nullopt;
@@ -187,17 +184,10 @@ bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
   }
   const std::optional<Vec2> centre = point_that_sees(polygon);
   if (!centre) return false;
-  Vec2 second_diagonal = Vec2::Zero();
-  double second_mixed = 0.0;
-  area = 0.0;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vec2 p = polygon[i] - *centre, q = polygon[(i + 1) % polygon.size()] - *centre, sum = p + q;
-    const double half = 0.5 * cross(p, q);
-    area += half;
-    second_diagonal += half / 12.0 * (p.cwiseAbs2() + q.cwiseAbs2() + sum.cwiseAbs2());
-    second_mixed += half / 12.0 * (p.x() * p.y() + q.x() * q.y() + sum.x() * sum.y());
-  }
-  const Principal axes = principal(second_diagonal.x() / area, second_mixed / area, second_diagonal.y() / area);
+  PolygonMoments moments;
+  for (std::size_t i = 0; i < polygon.size(); ++i) moments.add_edge(polygon[i] - *centre, polygon[(i + 1) % polygon.size()] - *centre);
+  const Eigen::Matrix2d second = moments.second / moments.area;
+  const Principal axes = principal(second(0, 0), second(0, 1), second(1, 1));
   if (!(axes.second > 0.0)) return false;
   // From the peak to the centre in short steps on Sigma.
   Vec3 x = frame_.origin;
@@ -207,13 +197,13 @@ bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
   const int steps = 1 + static_cast<int>(way.norm() / (kWalk * std::sqrt(axes.second)));
   if (steps > kWalkSteps) return false;
   double p = 0.0;
-  for (int step = 0; step < steps + kRimSteps; ++step) {
+  for (int step = 0; step < steps + kFreeSteps; ++step) {
     if (step < steps) x += way / steps;
     batch.point[0] = x;
     pressure.evaluate(batch);
     const Vec3 slope = batch.slope_b[0] - batch.slope_a[0];
     const double rate = slope.dot(frame_.axis);
-    if (!(rate > kLeastCosine * slope.norm())) return false;
+    if (!(rate > kGraphCosine * slope.norm())) return false;
     x += (batch.a[0] - batch.b[0]) / rate * frame_.axis;
     p = std::min(batch.a[0], batch.b[0]);
   }
@@ -229,8 +219,7 @@ bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
   outline_.clear();
   for (const Vec3& rim : fine_rim_) {
     const Vec3 d = rim - frame_.origin;
-    const Vec2 at(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm());
-    outline_.push_back({at, d.dot(frame_.axis), Vec2::Zero()});
+    outline_.push_back({frame_.parts_of(d), d.dot(frame_.axis), Vec2::Zero()});
   }
   return true;
 }
@@ -239,7 +228,7 @@ bool PolarRuleSolver::move_to_star(PairPressure& pressure) {
 void PolarRuleSolver::find_star_kinks(PairPressure& pressure) {
   double square = 0.0;
   for (const Vec3& x : fine_rim_) square = std::max(square, (x - frame_.origin).squaredNorm());
-  const double reach = kMargin * std::sqrt(square);
+  const double reach = kBeyondRim * std::sqrt(square);
   kinks_.clear();
   all_kinks_ = pressure.kinks({frame_.origin - Vec3::Constant(reach), frame_.origin + Vec3::Constant(reach)}, kinks_);
   std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
@@ -252,7 +241,7 @@ void PolarRuleSolver::cross_star(PairPressure& pressure) {
     if (!parts_at(kinks_[k])) continue;
     const bool side = kinks_[k].value(frame_.origin) > 0.0;
     const auto other = [&](const RimPoint& p) {
-      const Vec3 reach = direction(p.at.x(), p.at.y());
+      const Vec3 reach = frame_.across(p.at);
       const double linear = rise_.dot(reach);
       for (const double share : {0.25, 0.5, 0.75, 1.0}) {
         const double height = share * linear + share * share * (p.height - linear);
@@ -283,20 +272,17 @@ std::array<double, 2> PolarRuleSolver::outline_at(double cosine, double sine) co
 /// @param frame  of the peak   @param fine  the steps along the rim   @return false where no point sees the whole rim
 bool PolarRuleSolver::solve_about_star(const PolarJob& job, const PeakFrame& frame, bool fine, PatchPoints& points) {
   PairPressure& pressure = job.pressure;
-  const ContactSettings& settings = job.settings;
   frame_ = frame;
-  size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   about_middle_ = false;
   about_star_ = follow_rim_curve(pressure, fine) && move_to_star(pressure);
   if (!about_star_) return false;
   find_star_kinks(pressure);
   cross_star(pressure);
-  const bool fits = solve_split(pressure, settings);
+  const bool fits = solve_split(pressure, job.settings);
   about_star_ = false;
   if (!fits) return false;
-  parted_ = static_cast<std::uint32_t>(crossing_.size());
   polygon_ = outline_;
-  return finish(pressure, column_of(settings.error), job.regions, settings.error, nullptr, points);
+  return finish_parted(job, points);
 }
 
 }  // namespace supple::collision

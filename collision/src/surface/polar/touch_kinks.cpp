@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "supple/core/math.h"
+#include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr int kTouchSteps = 8;          // Newton's method
 constexpr double kSide = 1e-3;          // of the radius, for the second derivative along the ray
 constexpr double kClose = 1e-9;         // [rad]
 constexpr double kCloseRadius = 1e-4;   // of the radius: the angle is off by its square
@@ -45,7 +44,7 @@ PolarRuleSolver::Along PolarRuleSolver::along_ray(const PressureBatch& at, std::
 std::optional<double> PolarRuleSolver::touching_angle(PairPressure& pressure, const Touch& near) {
   double angle = near.angle, radius = near.radius, height = near.height;
   PressureBatch& batch = crossing_batch_;
-  for (int step = 0; step < kTouchSteps; ++step) {
+  for (int step = 0; step < kFreeSteps; ++step) {
     const math::SinCos at = math::sin_cos(angle);
     const auto place = [&](double r, double h) -> Vec3 { return frame_.origin + r * direction(at.cos, at.sin) + h * frame_.axis; };
     batch.resize(1);
@@ -77,7 +76,7 @@ void PolarRuleSolver::find_hidden_touches(PairPressure& pressure, std::span<cons
   for (const Corner& corner : corners) {
     if (corner.kink >= kinks_.size()) continue;
     const Vec3 d = corner.at - frame_.origin;
-    const Vec2 at(d.dot(frame_.u) / frame_.u.squaredNorm(), d.dot(frame_.v) / frame_.v.squaredNorm());
+    const Vec2 at = frame_.parts_of(d);
     const double angle = math::atan2(at.y(), at.x()), radius = at.norm(), height = d.dot(frame_.axis);
     const Vec3 along = direction(at.x() / radius, at.y() / radius);
     const double side = kSide * radius;

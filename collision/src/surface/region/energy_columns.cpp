@@ -6,10 +6,11 @@
 #include <limits>
 #include <vector>
 
+#include "numbers.h"
+#include "surface/plane.h"
+
 namespace supple::collision {
 namespace {
-
-using Vec2 = Eigen::Vector2d;
 
 constexpr double kFinest = 1.0 / 8192.0;  // step, over the longest column
 constexpr double kLongest = 1.0 / 16.0;   // step where both have pressure, over the longest column
@@ -96,7 +97,7 @@ class ColumnIntegral {
 
   /// Where the line through a place across enters and leaves the box [m]; none where it misses it.
   [[nodiscard]] Interval within_box(const Vec3& start) const {
-    Interval range{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    Interval range{-kInfinity, kInfinity};
     for (Eigen::Index k = 0; k < 3; ++k) {
       const double low = pair_.box.lower[k] - start[k], high = pair_.box.upper[k] - start[k];
       if (along_[k] == 0.0) {

@@ -1,9 +1,9 @@
+#include "numbers.h"
+#include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "surface/region/squeezed_region.h"
@@ -11,14 +11,10 @@
 namespace supple::collision {
 namespace {
 
-constexpr double kLeastAlong = 0.1;  // cosine of a way out of the apex to the axis
-constexpr double kLeastSight = 0.1;  // cosine of a body's normal to the ray, at the rim
 constexpr double kWidest = 1.3;      // across over along at the rim: energies by wider columns are off by more than asked
 constexpr double kEndsWithin = 1e-3;  // of the peak: ends beside the rim are that near to the other body's surface
 constexpr double kLong = 1.5;         // over the depth below the peak, to first order
-constexpr int kEndSteps = 40;
 constexpr int kMostOnColumn = 6;
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
@@ -56,7 +52,7 @@ bool PolarRuleSolver::column_ends(PairPressure& pressure, int side, double toler
   reached_.resize(n);
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
-  for (int iteration = 0; iteration < kEndSteps; ++iteration) {
+  for (int iteration = 0; iteration < kBracketSteps; ++iteration) {
     for (const std::size_t i : open_) {
       reached_[i] = end[i];
       line_point_[i] = (i + 1 < n ? node_.point[i] : peak_) + end[i] * column(i).way;
@@ -95,7 +91,7 @@ bool PolarRuleSolver::start_columns(int side) {
   const std::size_t n = node_.size();
   const double sign = side == 0 ? 1.0 : -1.0, spread = spread_[side];
   if (apex_[side] && start_out_of(*apex_[side], sign)) return true;
-  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, {1.0, 0.0, 0.0}});
+  column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, {{1.0, 0.0, 0.0}}});
   if (spread == 0.0) return true;
   for (std::size_t i = 0; i <= n; ++i) {
     const Vec3 d = (i < n ? node_.point[i] : peak_) - frame_.origin, across = d - d.dot(frame_.axis) * frame_.axis;
@@ -103,7 +99,7 @@ bool PolarRuleSolver::start_columns(int side) {
     along.way += spread * across;
     const double narrow = i < n ? 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis) : 1.0;
     if (!(narrow > 0.0)) return false;
-    along.swept = {narrow, spread * (1.0 + narrow), spread * spread};
+    along.swept = {{narrow, spread * (1.0 + narrow), spread * spread}};
   }
   return true;
 }
@@ -115,9 +111,9 @@ bool PolarRuleSolver::start_out_of(const Apex& apex, double sign) {
   for (std::size_t i = 0; i <= n; ++i) {
     const Vec3 x = i < n ? node_.point[i] : peak_, way = apex.way(x), normal = i < n ? normal_[i] : frame_.axis;
     const double along = sign * way.dot(frame_.axis);
-    if (!(along > kLeastAlong)) return false;
+    if (!(along > kLeastSight)) return false;
     const double flux = sign * normal.dot(way) / (along * normal.dot(frame_.axis)), bend = 1.0 / (along * apex.distance(x));
-    column_[i] = {way / along, {flux, 2.0 * bend * flux, bend * bend * flux}};
+    column_[i] = {way / along, swept_out_of_apex(flux, bend)};
   }
   return true;
 }
@@ -178,22 +174,19 @@ bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended)
 
 /// Whether the surface of a body leaves the other one near a place of it: by the place where their normals are the same, which is farthest out.
 bool PolarRuleSolver::comes_out(PairPressure& pressure, int side, Vec3 at) {
-  constexpr int kSteps = 40;
-  constexpr double kOnSurface = 1e-3, kAlike = 1e-3;  // of the feature size; between normals
+  constexpr double kNear = 1e-3, kAlike = 1e-3;  // to the surface, of the feature size; between normals
   const double size = pressure.feature_size(), out = -kEndsWithin * frame_.peak;
-  std::array<double, 1> own, other;
-  std::array<Vec3, 1> slope, other_slope;
-  for (int step = 0; step < kSteps; ++step) {
-    pressure.evaluate(side, {&at, 1}, own, slope);
-    pressure.evaluate(1 - side, {&at, 1}, other, other_slope);
-    const double steep = slope[0].norm(), other_steep = other_slope[0].norm();
+  for (int step = 0; step < kBracketSteps; ++step) {
+    Vec3 slope, other_slope;
+    const double own = pressure.value(side, at, slope), other = pressure.value(1 - side, at, other_slope);
+    const double steep = slope.norm(), other_steep = other_slope.norm();
     if (!(steep > 0.0)) return false;
-    const Vec3 normal = -slope[0] / steep;
-    const double off = own[0] / steep;
-    const bool on_surface = std::abs(off) <= kOnSurface * size;
-    if (on_surface && other[0] < out) return true;
+    const Vec3 normal = -slope / steep;
+    const double off = own / steep;
+    const bool on_surface = std::abs(off) <= kNear * size;
+    if (on_surface && other < out) return true;
     if (!(other_steep > 0.0)) return false;
-    const Vec3 aim = -other_slope[0] / other_steep, across = aim - aim.dot(normal) * normal;
+    const Vec3 aim = -other_slope / other_steep, across = aim - aim.dot(normal) * normal;
     if (on_surface && across.norm() < kAlike) return false;
     at += std::clamp(off, -size, size) * normal + size * across;
   }
@@ -237,12 +230,12 @@ void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, in
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3& begins = side == 0 ? node_.slope_a[i] : node_.slope_b[i];
     const Column& along = column(i);
-    points.displaced[side] += weight_[i] * along.volume(end_[side][i]);
+    points.displaced[side] += weight_[i] * along.swept.volume(end_[side][i]);
     const double length = reached_[i], last = line_value_[i], slope = line_slope_[i].dot(along.way);
     const double rest = -0.5 * last * last / slope;  // to where the pressure vanishes
-    const double width = along.width(0.0), width_there = along.width(length);
-    const double first_slope = begins.dot(along.way) * width + pressure_[i] * along.widens(0.0);
-    const double last_slope = slope * width_there + last * along.widens(length);
+    const double width = along.swept.width(0.0), width_there = along.swept.width(length);
+    const double first_slope = begins.dot(along.way) * width + pressure_[i] * along.swept.widens(0.0);
+    const double last_slope = slope * width_there + last * along.swept.widens(length);
     const double sum = rule.end * (pressure_[i] * width + last * width_there) + rule.slope * length * (first_slope - last_slope);
     points.energy[side] += weight_[i] * (length * sum + rest * width_there);
   }
@@ -255,7 +248,7 @@ void PolarRuleSolver::add_energy_from_ends(PairPressure& pressure, int nodes, in
   pressure.evaluate(side, line_point_, line_value_);
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < between; ++j) {
-      const double width = column(i).width(reached_[i] * rule.node[j]);
+      const double width = column(i).swept.width(reached_[i] * rule.node[j]);
       points.energy[side] += weight_[i] * reached_[i] * rule.weight[j] * width * line_value_[i * between + j];
     }
   }
@@ -270,7 +263,7 @@ void PolarRuleSolver::add_points(PairPressure& pressure, int nodes, int side, Pa
     const double length = end_[side][i];
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       points.volume_point.push_back(node_.point[i] + (length * gauss.node[j]) * column(i).way);
-      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j] * column(i).width(length * gauss.node[j]));
+      points.volume_weight.push_back(weight_[i] * length * gauss.weight[j] * column(i).swept.width(length * gauss.node[j]));
     }
   }
   add_to_region(pressure, side, begin, line_value_, points);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "surface/accuracy.h"
 #include "surface/panels/panel_rule.h"
 #include "surface/quadrature.h"
 #include "surface/region/squeezed_region.h"
@@ -39,13 +40,12 @@ bool start_columns(const ColumnJob& job, std::size_t side, std::span<const Panel
 
 /// Newton's method along the columns for the zero of the body's pressure, safeguarded by halving. @return whether all end, and fall as they should there
 bool find_ends(const ColumnJob& job, int side, double least_fall, std::vector<Column>& columns) {
-  constexpr int kMostSteps = 40;
   std::vector<std::size_t> open;
   std::vector<Vec3> point, slope;
   std::vector<double> value;
   for (std::size_t i = 0; i < columns.size(); ++i) open.push_back(i);
   bool lead_out = true;
-  for (int step = 0; step < kMostSteps && !open.empty(); ++step) {
+  for (int step = 0; step < kBracketSteps && !open.empty(); ++step) {
     point.clear();
     for (const std::size_t i : open) point.push_back(columns[i].from + columns[i].length * columns[i].way);
     value.resize(point.size());
@@ -88,7 +88,6 @@ void fill_columns(const GaussRule& rule, std::span<const Column> columns, PatchP
 }  // namespace
 
 void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<const PanelPoint> sigma, PatchPoints& points) {
-  constexpr int kMoreAcross = 2;  // Gauss points where columns may go through most of the body
   std::vector<Column> columns;
   std::vector<double> value;
   for (const std::size_t side : {0u, 1u}) {

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "pairs/boxes.h"
 #include "supple/core/error.h"
+#include "surface/accuracy.h"
 #include "surface/quadrature.h"
 
 namespace supple::collision {
@@ -17,8 +19,6 @@ constexpr double kFewestPlaces = 16.0, kMostPlaces = 512.0, kFewestCells = 4.0, 
 // What is smaller than a cell or than what lies between two places is a small share of the region: over the error, and over its root.
 constexpr double kPlacesOfError = 0.64, kCellsOfError = 0.5;
 constexpr std::size_t kMostLeaves = 4096;
-constexpr double kSafety = 2.0;         // of estimates
-constexpr double kKept = 0.5;           // of the error asked for: what cells that are not quartered may add up to
 constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns, off by the square of what the last two values lie apart
 
 }  // namespace
@@ -182,19 +182,19 @@ bool SqueezedRegion::choose(double error) {
     const double e = off(cell);
     sum += e;
     square += e * e;
-    return kSafety * std::sqrt(std::sqrt(square) * sum) > most;
+    return kTwoOrders * std::sqrt(std::sqrt(square) * sum) > most;
   };
   if (std::none_of(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return grows_beyond(cell, error); })) return false;
   std::stable_sort(leaf_.begin(), leaf_.end(), [&](const Cell& p, const Cell& q) { return off(p) < off(q); });
   sum = square = 0.0;
-  const auto first = std::find_if(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return grows_beyond(cell, kKept * error); });
+  const auto first = std::find_if(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return grows_beyond(cell, kOfKept * error); });
   split_.assign(first, leaf_.end());
   leaf_.erase(first, leaf_.end());
   return true;
 }
 
 void SqueezedRegion::fill(const Lost& lost, const Box& overlap, const Vec3& across, PatchPoints& points) {
-  SUPPLE_EXPECTS(overlap.lower.allFinite() && overlap.upper.allFinite());
+  SUPPLE_EXPECTS(is_finite(overlap));
   Eigen::Index axis = 0;
   across.cwiseAbs().maxCoeff(&axis);
   along_ = Vec3::Unit(axis);

@@ -26,7 +26,7 @@ class SqueezedRegion {
   struct Lost {
     PairPressure& pressure;
     int side;                                  ///< whose space it is
-    std::span<const ContactBody* const> third;  ///< bodies that take space from the pair, too
+    Thirds third;  ///< bodies that take space from the pair, too
     double error;                              ///< relative, of its volume and of the integral of the pressure
     bool equal = false;                        ///< the pressures are the same everywhere: all that the body has
   };
