@@ -24,9 +24,8 @@ namespace supple::fuzz {
 /// A folder of this process, removed at its end; in memory where the system has such a place, as a file on a disk takes longer than its reading.
 inline const std::filesystem::path& scratch() {
   struct Folder {
-    static constexpr const char* kInMemory = "/dev/shm";
-    std::filesystem::path path =
-        (::access(kInMemory, W_OK) == 0 ? kInMemory : std::filesystem::temp_directory_path()) / std::filesystem::path("supple_fuzz_" + std::to_string(::getpid()));
+    static std::filesystem::path place() { return ::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : std::filesystem::temp_directory_path(); }
+    std::filesystem::path path = place() / ("supple_fuzz_" + std::to_string(::getpid()));
     Folder() { std::filesystem::create_directories(path); }
     ~Folder() {
       std::error_code ignored;
