@@ -26,7 +26,8 @@ def octahedron(path):
 
 
 def fit(context, mesh, out, env=None):
-    return run_process([context.tool, "fit", mesh, "-o", out, *COARSE, "--overwrite"], env, memory=None if env else MEMORY)
+    """By the program that `supple fit` starts: preloaded libraries do not follow there."""
+    return run_process([context.bin / "supple_fit", mesh, "-o", out, *COARSE, "--overwrite"], env, memory=None if env else MEMORY)
 
 
 def left_by(folder, ended, reference):
