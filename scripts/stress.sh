@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Stress tests: hostile and mutated inputs, failing memory and disks, kills, races, long runs. Rows and counts: docs/reliability.md.
-#   scripts/stress.sh [ROW...] [--seed N] [--share 0.1] [--jobs N] [--report] [--self-test]     all rows but libfuzzer when none is named, two to three hours on two cores
+#   scripts/stress.sh [ROW...] [--seed N] [--share 0.1] [--scratch DIR] [--jobs N] [--report] [--self-test]     all rows but those of libFuzzer when none is named, two to three hours on two cores
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/dependencies.sh"
@@ -15,7 +15,7 @@ for word in "$@"; do
 done
 
 install_packages build run test
-[[ " $* " != *" libfuzzer "* ]] || install_packages fuzz
+[[ " $* " != *" libfuzzer-"* ]] || install_packages fuzz
 # Another build folder is used as it is, without building.
 if [[ $build == "$supple_root/build/release" ]]; then
   log=$supple_root/build/logs/stress_build.log

@@ -21,10 +21,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 namespace supple::fuzz {
 
-/// A folder of this process, removed at its end.
+/// A folder of this process, removed at its end; in memory where the system has such a place, as a file on a disk takes longer than its reading.
 inline const std::filesystem::path& scratch() {
   struct Folder {
-    std::filesystem::path path = std::filesystem::temp_directory_path() / ("supple_fuzz_" + std::to_string(::getpid()));
+    static std::filesystem::path place() { return ::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : std::filesystem::temp_directory_path(); }
+    std::filesystem::path path = place() / ("supple_fuzz_" + std::to_string(::getpid()));
     Folder() { std::filesystem::create_directories(path); }
     ~Folder() {
       std::error_code ignored;

@@ -8,6 +8,7 @@
 ///   SUPPLE_FAIL_KIND   `new` (default): operator new, by whichever library it is called; `malloc`: malloc, calloc, realloc and
 ///                      posix_memalign where the program itself calls them
 ///   SUPPLE_FAIL_COUNT  a file that gets the number of allocations when the program ends
+///   SUPPLE_SERVE       many runs by one process (served.h); NUMBER is SUPPLE_FAIL_AT, WORD SUPPLE_FAIL_KIND
 #include <fcntl.h>
 #include <link.h>
 #include <unistd.h>
@@ -19,6 +20,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <new>
+
+#include "served.h"
 
 extern "C" {
 void* __libc_malloc(std::size_t);
@@ -61,9 +64,14 @@ __attribute__((constructor)) void begin() {
   settings.at = number("SUPPLE_FAIL_AT", 0);
   settings.many = number("SUPPLE_FAIL_MANY", 1);
   const char* kind = std::getenv("SUPPLE_FAIL_KIND");
-  settings.of_malloc = kind != nullptr && std::strcmp(kind, "malloc") == 0;
   settings.count_file = std::getenv("SUPPLE_FAIL_COUNT");
   dl_iterate_phdr(keep_text, nullptr);
+  supple::stress::Request request;
+  if (supple::stress::serve(request)) {
+    settings.at = request.number;
+    kind = request.word.data();
+  }
+  settings.of_malloc = kind != nullptr && std::strcmp(kind, "malloc") == 0;
   ready.store(true);
 }
 

@@ -4,6 +4,7 @@
 //                          writes alone); short: call AT reads or writes half; crash: call AT ends the program; none
 //   SUPPLE_FAIL_IO_AT      number of that call, from 1
 //   SUPPLE_FAIL_IO_COUNT   file that gets the number of calls when the program ends
+//   SUPPLE_SERVE           many runs by one process (served.h); NUMBER is SUPPLE_FAIL_IO_AT, WORD SUPPLE_FAIL_IO_KIND
 // Programs that this one starts are left alone.
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -19,6 +20,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+
+#include "served.h"
 
 namespace {
 
@@ -57,6 +60,11 @@ __attribute__((constructor)) void begin() {
   settings.at = at != nullptr ? std::strtol(at, nullptr, 10) : 0;
   settings.count_file = std::getenv("SUPPLE_FAIL_IO_COUNT");
   unsetenv("LD_PRELOAD");
+  supple::stress::Request request;
+  if (supple::stress::serve(request)) {
+    settings.at = request.number;
+    settings.kind = kind_named(request.word.data());
+  }
 }
 
 __attribute__((destructor)) void end() {

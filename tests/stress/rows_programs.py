@@ -5,6 +5,7 @@ import math
 import pathlib
 import re
 import subprocess
+import threading
 import time
 
 from support import Outcome, run_process
@@ -225,25 +226,25 @@ def fuzz(context, asked):
     return outcome
 
 
-def sanitized_fuzz(context, asked):
-    """The fuzz targets by libFuzzer, for so many minutes in all; what they find is left in the folder of each."""
-    outcome, inputs = Outcome(), 0
-    words = ["cmake", "--build", "--preset", "asan_clang", "--target", *("fuzz_" + name for name in FUZZ_TARGETS)]
-    for command in (["cmake", "--preset", "asan_clang"], words):
-        built = run_process(command, timeout=4 * LONG_S, cwd=context.sources)
-        if built.code != 0:
-            raise RuntimeError(f"{' '.join(command[:4])} ended with {built.code}: {(built.err or built.out)[-300:]}")
-    for name in FUZZ_TARGETS:
-        folder = context.folder("libfuzzer_" + name)
-        (folder / "found").mkdir()
-        seconds = max(1, 60 * asked // len(FUZZ_TARGETS))
-        ended = run_process([context.sources / "build/asan_clang/bin" / ("fuzz_" + name), f"-max_total_time={seconds}", "-timeout=120", "-rss_limit_mb=4096",
-                             "-print_final_stats=1", "found", context.sources / "tests/fuzz/corpus" / name], timeout=seconds + LONG_S, cwd=folder)
-        tried = re.search(r"^stat::number_of_executed_units: (\d+)", ended.err, re.MULTILINE)
-        inputs += int(tried.group(1)) if tried else 0
-        if ended.code != 0:
-            outcome.faults.append(f"fuzz_{name} ended with {ended.code} ({folder}): {ended.err[-300:]}")
-        outcome.reached += seconds
-    outcome.reached = round(outcome.reached / 60)
-    outcome.note = f"{inputs} inputs"
+BUILDING = threading.Lock()
+
+
+def sanitized_fuzz(target, context, asked):
+    """A fuzz target by libFuzzer, for so many inputs, but at most an hour; what it finds is left in its folder."""
+    outcome = Outcome()
+    with BUILDING:
+        for command in (["cmake", "--preset", "fuzz"], ["cmake", "--build", "--preset", "fuzz", "--target", "fuzz_" + target]):
+            built = run_process(command, timeout=4 * LONG_S, cwd=context.sources)
+            if built.code != 0:
+                raise RuntimeError(f"{' '.join(command)} ended with {built.code}: {(built.err or built.out)[-300:]}")
+    folder = context.folder("libfuzzer_" + target)
+    (folder / "found").mkdir()
+    ended = run_process([context.sources / "build/fuzz/bin" / ("fuzz_" + target), f"-runs={asked}", f"-max_total_time={LONG_S}", f"-seed={context.seed}", "-timeout=120",
+                         "-rss_limit_mb=4096", "-print_final_stats=1", "found", context.sources / "tests/fuzz/corpus" / target], timeout=2 * LONG_S, cwd=folder)
+    tried = re.search(r"^stat::number_of_executed_units: (\d+)", ended.err, re.MULTILINE)
+    outcome.reached = int(tried.group(1)) if tried else 0
+    kept = len(list((folder / "found").iterdir()))
+    outcome.note = f"{kept} of them reached something new"
+    if ended.code != 0:
+        outcome.faults.append(f"fuzz_{target} ended with {ended.code} ({folder}): {ended.err[-300:]}")
     return outcome

@@ -1,4 +1,5 @@
 """Runs that are killed, interrupted, raced, resumed and continued from altered states."""
+import concurrent.futures
 import shutil
 import signal
 import subprocess
@@ -28,30 +29,39 @@ def start(command):
                             start_new_session=True)
 
 
+def killed(context, run, number, times, pick):
+    """A run that is killed so often, each time at a random moment, and resumed. @return faults"""
+    out = context.scratch / "kill" / f"out_{number}"
+    where, faults = f"{run.name}, turn {number}", []
+    for again in range(times):
+        process = start(run.command(out, *(["--resume"] if again else []), threads=pick.choice([1, 3])))
+        moment = pick.uniform(0.0, 1.1 * run.seconds)
+        time.sleep(moment)
+        process.kill()  # that process alone: what it started must end by itself
+        process.wait()
+        process.stderr.close()
+        if out.exists():
+            faults += [f"{where}, killed after {moment:.3f} s: {fault}" for fault in broken_files(out, run.files)]
+    fault = fault_of_exit(run_process(run.command(out, "--resume")), {0})
+    faults += [f"{where}, resumed: {text}" for text in ([fault] if fault else run.difference(out))]
+    faults += [f"{where}: still running: {text}" for text in orphans(out)]
+    shutil.rmtree(out, ignore_errors=True)
+    return faults
+
+
 def kill(context, asked):
-    """Killed at a random moment, once or several times, and resumed."""
-    outcome, pick = Outcome(), context.random("kill")
+    """Runs killed once or several times, and resumed; some at the same time."""
+    outcome = Outcome()
     runs = small_runs(context, "kill", KILLED)
+    turns = []
     while outcome.reached < asked:
-        run = runs[outcome.reached % len(runs)]
-        out = context.scratch / "kill" / f"out_{outcome.reached}"
-        shutil.rmtree(out, ignore_errors=True)
-        where = f"{run.name}, kill {outcome.reached}"
-        for again in range(pick.choice([1, 1, 2, 3])):
-            process = start(run.command(out, *(["--resume"] if again else []), threads=pick.choice([1, 3])))
-            moment = pick.uniform(0.0, 1.1 * run.seconds)
-            time.sleep(moment)
-            process.kill()  # that process alone: what it started must end by itself
-            process.wait()
-            process.stderr.close()
-            outcome.reached += 1
-            if out.exists():
-                outcome.faults += [f"{where} after {moment:.3f} s: {fault}" for fault in broken_files(out, run.files)]
-        ended = run_process(run.command(out, "--resume"))
-        fault = fault_of_exit(ended, {0})
-        outcome.faults += [f"{where}, resumed: {text}" for text in ([fault] if fault else run.difference(out))]
-        outcome.faults += [f"{where}: still running: {text}" for text in orphans(out)]
-        shutil.rmtree(out, ignore_errors=True)
+        pick = context.random(f"kill {len(turns)}")
+        turns.append((context, runs[len(turns) % len(runs)], len(turns), pick.choice([1, 1, 2, 3]), pick))
+        outcome.reached += turns[-1][3]
+    with concurrent.futures.ThreadPoolExecutor(context.jobs) as pool:
+        for faults in pool.map(lambda turn: killed(*turn), turns):
+            outcome.faults += faults
+    outcome.note = f"{len(turns)} runs of {len(runs)} scenes"
     return outcome
 
 

@@ -58,7 +58,7 @@ def wrong_tools(context):
 
 
 def crashing_io(context):
-    found = len(rows_failures.failing_io(context, 2, kinds=("crash",), settings=(rows_failures.TINY,)).faults) >= 2
+    found = len(rows_failures.failing_io(context, 0.01, kinds=("crash",), settings=(rows_failures.TINY,)).faults) >= 2
     print(f"{'io, a call that ends the program':<44} {'found' if found else 'nothing found, WRONG'}", flush=True)
     return not found
 

@@ -33,6 +33,7 @@ class Row:
     unit: str
     run: object
     fixed: bool = False  # no share changes it
+    every: bool = False  # all that there are: `run` takes the share, and finds the number
     only_named: bool = False  # takes hours
 
 
@@ -47,14 +48,15 @@ ROWS = [
     Row("files", "meshes (OBJ, PLY, OFF, STL) and tables (CSV), mutated", 2_000, "files", functools.partial(rows_inputs.by_libraries, "files")),
     Row("fits", "fits of damaged meshes, scenes with damaged objects, fits whose input, output and memory fail or that are killed: refused with a message, no incomplete file", 400, "trials", rows_fits.fits),
     Row("fuzz", "fuzz targets (mesh, CSV, PNG, scene, state with a right checksum): corpora with changes; used or refused", 50_000, "inputs", rows_programs.fuzz),
-    Row("libfuzzer", "the fuzz targets led by coverage, with address and undefined-behaviour sanitizers, by clang (builds all libraries first)", 300, "minutes", rows_programs.sanitized_fuzz, only_named=True),
+    *(Row(f"libfuzzer-{target}", f"fuzz target {target} led by coverage, with address and undefined-behaviour sanitizers in core, render and scenes, by clang", 10_000_000, "inputs",
+          functools.partial(rows_programs.sanitized_fuzz, target), only_named=True) for target in rows_programs.FUZZ_TARGETS),
     Row("state-bytes", "saved states with altered bytes, by the library: refused", 10_000, "states", functools.partial(rows_inputs.by_libraries, "states")),
     Row("states", "saved states altered or exchanged, by `run --resume`, `render`, `export`: refused with 7, or simulated again to the same bits", 1_000, "commands", rows_runs.states),
     Row("frames", "lists of frames for `--frames`", 100_000, "lists", functools.partial(rows_inputs.by_libraries, "frames")),
-    Row("grids", "OpenVDB files altered or truncated: exported again, complete", 200, "files", rows_runs.grids),
-    Row("memory", "the n-th allocation fails: exit 6 with a message, no incomplete file, resumed to the same bits", 1_000, "runs", rows_failures.failing_memory),
-    Row("io", "EIO, ENOSPC, EINTR or a short count at the n-th call: exit 4 or the same result, resumed to the same bits", 2_000, "runs", rows_failures.failing_io),
-    Row("kill", "SIGKILL at random moments, then `--resume`: same bits, no temporary file, no process left", 200, "kills", rows_runs.kill),
+    Row("grids", "OpenVDB files altered or truncated: exported again, complete", 1_000, "files", rows_runs.grids),
+    Row("memory", "the n-th allocation fails: exit 6 with a message, no incomplete file, resumed to the same bits", 1, "allocations", rows_failures.failing_memory, every=True),
+    Row("io", "EIO, ENOSPC, EINTR or a short count at the n-th call: exit 4 or the same result, resumed to the same bits", 1, "failing calls", rows_failures.failing_io, every=True),
+    Row("kill", "SIGKILL at random moments, then `--resume`: same bits, no temporary file, no process left", 500, "kills", rows_runs.kill),
     Row("signals", "SIGINT, SIGTERM: exit 130, 143, resumed to the same bits", 100, "signals", rows_runs.signals),
     Row("races", "two runs in one folder: one runs, the other is refused with the reason", 50, "races", rows_runs.races),
     Row("shards", "several processes draw frames of one run, SIGKILL at random moments, drawn again: same bytes, no temporary file, no process left", 100, "kills", rows_runs.shards),
@@ -81,7 +83,7 @@ def run_row(row, context):
     asked = row.asked if row.fixed else max(1, math.ceil(row.asked * context.share))
     begin = time.monotonic()
     try:
-        outcome = row.run(context, asked)
+        outcome = row.run(context, context.share if row.every else asked)
         if outcome.reached == 0 and not outcome.faults:
             outcome.faults.append("nothing was tried")
     except Exception as error:  # a row that cannot be run has failed, and the others go on
@@ -92,7 +94,7 @@ def run_row(row, context):
 
 def tell(row, asked, outcome, seconds):
     result = "passed" if not outcome.faults else f"{len(outcome.faults)} FAULTS"
-    of_asked = f" of {asked}" if row.asked > 1 else ""
+    of_asked = f" of {outcome.planned}" if outcome.planned else f" of {asked}" if row.asked > 1 else ""
     print(f"{row.name:<14} {outcome.reached}{of_asked} {row.unit}, {result}, {seconds:.0f} s{', ' + outcome.note if outcome.note else ''}", flush=True)
     for fault in outcome.faults[:MOST_FAULTS_TOLD]:
         print("    " + fault)
@@ -100,57 +102,30 @@ def tell(row, asked, outcome, seconds):
         print(f"    and {len(outcome.faults) - MOST_FAULTS_TOLD} more")
 
 
-def asked_in_words(row):
+def asked_in_words(row, outcome=Outcome()):
+    if outcome.planned:
+        return f"all {outcome.planned:,} {row.unit}"
     return f"{row.asked:,} {row.unit}" if row.asked > 1 else f"all {row.unit}"
 
 
 def report_line(row, context, outcome, seconds, at_commit):
-    command = f"`scripts/stress.sh {row.name} --seed {context.seed}" + ("" if row.fixed or context.share == 1.0 else f" --share {context.share:g}") + "`"
-    asked = asked_in_words(row)
+    command = f"`scripts/stress.sh {row.name} --seed {context.seed}" + ("" if row.fixed or context.share == 1.0 else f" --share {context.share:g}")
+    command += ("" if str(context.scratch).startswith(str(context.build)) else f" --scratch {context.scratch.parent}") + "`"
+    asked = asked_in_words(row, outcome)
     today = datetime.date.today().isoformat()
     note = f" ({outcome.note})" if outcome.note else ""
     return f"| {row.name} | {row.what} | {asked} | {outcome.reached:,}{note} | {len(outcome.faults)} | {seconds:.0f} | {today}, {at_commit} | {command} |"
 
 
-HEAD = """# Reliability
-
-When a run is killed, the disk fills or a scene is hostile, no saved frame is lost, no incomplete file appears under a final name, and a message
-says what happened and what to do. `scripts/stress.sh` tests this row by row. With `--report` it updates the lines of the rows that it ran.
-"Planned" is the number of trials of a full run, "made" that of the last run; where fewer were made, the run was cut short. Several rows may run at the same time, so the
-times include waiting. `scripts/stress.sh --self-test` plants faults and checks that the rows find them.
-
-| row | test | planned | made | failures | time [s] | date, commit | command |
-|---|---|---|---|---|---|---|---|
-"""
-
-FOOT = """
-## What is not covered, and why
-
-- **Graphics drivers.** What Mesa does when memory is out is its own. The row `memory` draws by the path tracer.
-- **Power failure and network file systems.** A kill ends the process, not the machine. Files are flushed to the disk before they get their final names,
-  but nobody has pulled a plug. NFS has not been tried; on sshfs, mounted once, 13 kills, 4 races, 8 kills while frames are shared and 6 signals show no fault.
-- **OpenVDB files.** No command reads them. A damaged file is exported again from the saved states.
-- **Fuzzing led by coverage.** It needs clang. `scripts/test.sh` runs each target for a minute, with the address and undefined-behaviour sanitizers in core, render
-  and scenes, and replays the corpora with changes in the optimised build. `scripts/check_all.sh sanitizers` runs each target for a minute with the sanitizers in
-  all modules, and `scripts/stress.sh libfuzzer` for an hour.
-- **Sanitizers.** `scripts/test.sh` runs core, implicit and collision with those of GCC, without the longest tests (CMakePresets.json). `scripts/check_all.sh sanitizers` builds all modules and the tool with those of clang.
-  [checks.md](checks.md) names the version for which it passed; without a line there it has not been run.
-- **Bits of other builds.** Results are the same for any number of threads, but not for another compiler. A run continues only from states of its own build.
-- **Order of particles.** Explicit steps apply the friction law pair by pair, so another order changes the result by the error of the step. The row `invariance` leaves
-  this law out.
-- **Obstacles out of reach.** A finished run is drawn again with other obstacles at rest where boxes around each object, over 1/32 of the run or less, prove that nothing came to them. One
-  inside such a box that nothing touched is refused, and so are obstacles that move and those of primitives. `--resume` takes no other obstacles.
-"""
-
-
 def write_report(lines):
-    """Rows that were not run this time keep their last line."""
-    known = {}
-    if REPORT.exists():
-        known = {match.group(1): match.group(0) for match in re.finditer(r"^\| ([a-z-]+) \|.*$", REPORT.read_text(), re.MULTILINE) if match.group(1) != "row"}
-    known.update(lines)
-    never = lambda row: f"| {row.name} | {row.what} | {asked_in_words(row)} | 0, not run | | | | `scripts/stress.sh {row.name}` |"
-    REPORT.write_text(HEAD + "".join(known.get(row.name, never(row)) + "\n" for row in ROWS) + FOOT)
+    """Rows that were not run this time keep their last line; the text around the table is as it was."""
+    text = REPORT.read_text()
+    line = re.compile(r"^\| ([a-z-]+) \|.*\n", re.MULTILINE)
+    known = {match.group(1): match.group(0) for match in line.finditer(text)} | {name: made + "\n" for name, made in lines.items()}
+    never = lambda row: f"| {row.name} | {row.what} | {asked_in_words(row)} | 0, not run | | | | `scripts/stress.sh {row.name}` |\n"
+    head, rule, _ = text.partition("|---|---|---|---|---|---|---|---|\n")
+    foot = text[text.rindex("\n|") + 1:].partition("\n")[2]
+    REPORT.write_text(head + rule + "".join(known.get(row.name, never(row)) for row in ROWS) + foot)
 
 
 def run_rows(rows, context, report):
@@ -170,11 +145,12 @@ def run_rows(rows, context, report):
 
 def main():
     parser = argparse.ArgumentParser(prog="scripts/stress.sh", description="Runs stress tests, row by row: " + ", ".join(row.name for row in ROWS) + ".")
-    parser.add_argument("rows", nargs="*", metavar="ROW", help="all but libfuzzer when none is named")
+    parser.add_argument("rows", nargs="*", metavar="ROW", help="all but those of libFuzzer when none is named")
     parser.add_argument("--seed", type=int, default=1, help="seed of random numbers (default 1)")
     parser.add_argument("--share", type=float, default=1.0, help="share of the planned numbers, e.g. 0.1")
     parser.add_argument("--report", action="store_true", help="write the lines of these rows into docs/reliability.md")
     parser.add_argument("--build", default=str(SOURCES / "build/release"), help="build folder (default build/release)")
+    parser.add_argument("--scratch", help="folder for what the rows write (default: below the build folder); in memory, as /dev/shm, they are quicker")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="rows at the same time (default: one per processor)")
     parser.add_argument("--self-test", action="store_true", help="plant faults and expect every row that is tried to find them")
     arguments = parser.parse_args()
@@ -183,7 +159,7 @@ def main():
         parser.error(f"no row is named {', '.join(sorted(unknown))}; rows: {', '.join(row.name for row in ROWS)}")
     if not 0.0 < arguments.share <= 1.0:
         parser.error("--share: expected a number above 0, at most 1")
-    scratch = pathlib.Path(arguments.build).resolve() / "stress" / str(os.getpid())
+    scratch = pathlib.Path(arguments.scratch or pathlib.Path(arguments.build) / "stress").resolve() / f"stress_{os.getpid()}"
     context = Context(SOURCES, arguments.build, scratch, arguments.seed, arguments.share, max(1, arguments.jobs))
     if arguments.self_test:
         import self_test

@@ -15,6 +15,7 @@ import time
 
 MB = 1 << 20
 TIME_LIMIT_S = 600  # of a process that nothing else ends
+SERVED_LIMIT_S = 60  # of small runs
 MOST_FAULTS_TOLD = 20
 
 
@@ -24,6 +25,7 @@ class Outcome:
     reached: int = 0
     faults: list = dataclasses.field(default_factory=list)
     note: str = ""
+    planned: int = 0  # at full share, where the row itself finds that out
 
 
 @dataclasses.dataclass
@@ -96,6 +98,44 @@ def run_process(words, env=None, timeout=TIME_LIMIT_S, cwd=None, memory=None):
     return Ended(None if late.is_set() else process.returncode, texts["out"], texts["err"], usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024)
 
 
+class Served:
+    """A program that starts and links once and is forked before its main for each run, by a preloaded library (served.h)."""
+
+    def __init__(self, command, library, env, errors):
+        self.errors = os.open(errors, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o600)
+        requests, self.requests = os.pipe()
+        answers, answer = os.pipe()
+        self.answers = os.fdopen(answers)
+        self.process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.errors, start_new_session=True,
+                                        env={**os.environ, **env, "LD_PRELOAD": str(library), "SUPPLE_SERVE": f"{requests} {answer}"}, pass_fds=(requests, answer),
+                                        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CORE, (0, 0)))
+        os.close(requests)
+        os.close(answer)
+
+    def run(self, number=0, word="none"):
+        """One run. What the words mean is told by the library."""
+        os.ftruncate(self.errors, 0)
+        os.write(self.requests, f"{number} {word}\n".encode())
+        child, late = int(self.answers.readline()), threading.Event()
+
+        def end():
+            late.set()
+            os.kill(child, signal.SIGKILL)
+
+        timer = threading.Timer(SERVED_LIMIT_S, end)
+        timer.start()
+        status = int(self.answers.readline())
+        timer.cancel()
+        err = os.pread(self.errors, os.fstat(self.errors).st_size, 0).decode("utf-8", "replace")
+        return Ended(None if late.is_set() else os.waitstatus_to_exitcode(status), "", err, 0.0, 0)
+
+    def close(self):
+        os.close(self.requests)
+        self.process.wait()
+        self.answers.close()
+        os.close(self.errors)
+
+
 def fault_of_exit(ended, allowed):
     """What is wrong with the end of a process, or nothing: exit codes that are not allowed, crashes, and refusals without a message."""
     first = (ended.err.strip().splitlines() or [""])[0][:300]
@@ -116,6 +156,11 @@ def fault_of_exit(ended, allowed):
 REPORTS = re.compile(r"^(result|render|export)\.json$")
 
 
+def digest(path):
+    data = path.read_bytes()
+    return str(len(data)) if path.suffix == ".vdb" else hashlib.sha256(data).hexdigest()
+
+
 def contents(folder):
     """Hash of every finished file below a folder, by name."""
     found = {}
@@ -125,9 +170,23 @@ def contents(folder):
         temporary = any(part.endswith(".tmp") for part in path.relative_to(folder).parts)
         if not path.is_file() or path.name == ".lock" or temporary or REPORTS.match(name):
             continue
-        data = path.read_bytes()
-        found[name] = str(len(data)) if name.endswith(".vdb") else hashlib.sha256(data).hexdigest()
+        found[name] = digest(path)
     return found
+
+
+def remains(folder):
+    """What a resumed run finds: every file by name and contents, of reports the outcome."""
+    left = []
+    for path in sorted(pathlib.Path(folder).rglob("*")):
+        name = str(path.relative_to(folder))
+        if path.is_file() and REPORTS.match(name):
+            try:
+                left.append((name, json.loads(path.read_text()).get("outcome")))
+            except ValueError:
+                left.append((name, path.read_text()))
+        else:
+            left.append((name, digest(path) if path.is_file() else ""))
+    return tuple(left)
 
 
 def temporaries(folder):

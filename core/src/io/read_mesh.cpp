@@ -323,7 +323,9 @@ Mesh read_ply(std::string_view text, const std::string& path) {
           const double index = numbers.next(property.type);
           if (!faces) continue;
           if (!(index >= 0.0) || index >= static_cast<double>(mesh.position.size())) {
-            refuse(path, "expected faces of the vertices before them", "vertex " + std::to_string(static_cast<long long>(index)));
+            std::string found = "vertex ";
+            append_number(found, index);
+            refuse(path, "expected faces of the vertices before them", found);
           }
           corner.push_back(static_cast<std::uint32_t>(index));
         }

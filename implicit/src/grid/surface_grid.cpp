@@ -272,6 +272,8 @@ void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid>
 
 void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid* const> grids) {
   openvdb::initialize();
+  // OpenVDB makes the name of the type once, by a stream, which ends early where memory is out; no program could read the file.
+  if (FloatGrid::gridType() != "Tree_float_5_4_3") throw std::bad_alloc();
   openvdb::GridCPtrVec pointers;
   for (const SurfaceGrid* grid : grids) {
     SUPPLE_EXPECTS(grid != nullptr && grid->impl_ != nullptr);

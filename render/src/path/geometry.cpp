@@ -21,7 +21,8 @@ namespace {
 void check(RTCDevice device) {
   const RTCError code = rtcGetDeviceError(device);
   if (code == RTC_ERROR_NONE) return;
-  const bool memory = code == RTC_ERROR_OUT_OF_MEMORY;
+  // An unknown error is an exception of a task that Embree cancelled, which it does where an allocation fails in another one.
+  const bool memory = code == RTC_ERROR_OUT_OF_MEMORY || code == RTC_ERROR_UNKNOWN;
   throw Error(memory ? ErrorKind::Limit : ErrorKind::Internal,
               Fault{.place = "render", .key = {}, .expected = memory ? "no memory for the triangles of the picture"
                                                                      : "Embree reports error " + std::to_string(code),
@@ -130,6 +131,7 @@ Geometry::Geometry() : device_(given(nullptr, rtcNewDevice("set_affinity=0"))) {
 }
 
 Geometry::~Geometry() {
+  if (committing_) return;  // TBB would wait for ever for a task that it had no memory for
   for (const auto& part : parts_)  // of a picture whose making ran out of memory some are not there
     if (part != nullptr && part->geometry != nullptr) rtcReleaseGeometry(part->geometry);
   rtcReleaseScene(scene_);
@@ -247,10 +249,12 @@ void Geometry::set(std::span<const Item> items, const PictureSpace& space, doubl
     ++counts_.built;
   }
   // By the thread that draws: others draw other pictures. A device with threads=1 would limit the threads of the whole process.
+  committing_ = true;
   if (changed) Executor(1).run([this] { rtcJoinCommitScene(scene_); });
   RTCBounds box;
   rtcGetSceneBounds(scene_, &box);
   check(device_);
+  committing_ = false;
   lower_ = {box.lower_x, box.lower_y, box.lower_z};
   upper_ = {box.upper_x, box.upper_y, box.upper_z};
   const float margin = 1e-4F * (upper_ - lower_).norm();  // of round-off, and no ray along a face lies in it

@@ -121,6 +121,7 @@ class Geometry {
   float radius_ = 0.0F;
   float wire_ = 0.0F;
   bool scene_is_new_ = true;
+  bool committing_ = false;  ///< and still so after a commit that failed
   Counts counts_;
 };
 

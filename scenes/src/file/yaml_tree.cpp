@@ -11,6 +11,7 @@
 #include <sstream>
 #include <utility>
 
+#include "file/yaml_faults.h"
 #include "file/yaml_quantity.h"
 
 namespace supple::scenes {
@@ -83,6 +84,11 @@ class Builder : public YAML::EventHandler {
   Builder(std::uint32_t source, Tree& tree, FaultList& faults) : source_(source), tree_(tree), faults_(faults) {}
 
   Node* root = nullptr;
+  Mark last;                 ///< of the last node
+  bool last_quoted = false;  ///< it is a text in quotes, or one after '|' or '>'
+
+  /// The innermost node that is not complete, or null.
+  [[nodiscard]] const Node* open() const { return open_.empty() ? nullptr : open_.back().node; }
 
   void OnDocumentStart(const YAML::Mark& mark) override {
     if (documents_++ > 0) stop(at(mark), "expected one document", "another one", "remove '---' and what follows it");
@@ -105,6 +111,8 @@ class Builder : public YAML::EventHandler {
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor, const std::string& value) override {
     check_tag(mark, tag);
+    last = at(mark);
+    last_quoted = tag == "!";
     if (expects_key()) {
       Open& open = open_.back();
       open.has_key = true;
@@ -198,6 +206,8 @@ class Builder : public YAML::EventHandler {
   }
   void begin(Node::Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
     check_tag(mark, tag);
+    last = at(mark);
+    last_quoted = false;
     if (expects_key()) stop(at(mark), "expected a key", "a list or a mapping", "keys are plain words");
     if (open_.size() >= kDeepest) too_deep(at(mark));
     count(at(mark), 1);
@@ -328,8 +338,13 @@ Node* parse_yaml(const std::string& text, std::uint32_t source, Tree& tree, Faul
   } catch (const Stop&) {
     return nullptr;
   } catch (const YAML::Exception& error) {
-    const bool expressions = text.find("${") != std::string::npos;
-    faults.add(builder.at(error.mark), "", "not valid YAML: " + shown(error.msg), "", expressions ? "expressions inside [ ] or { } need quotes: \"${...}\"" : "");
+    add_yaml_fault(error.msg, builder.at(error.mark), {text, builder.last, builder.open()}, faults);
+    return nullptr;
+  }
+  // yaml-cpp ends a text without a closing quote where the file ends.
+  const std::size_t begin = byte_of(text, builder.last);
+  if (builder.last_quoted && unclosed_quote(text, begin) == begin) {
+    add_unclosed_quote(begin, source, text, faults);
     return nullptr;
   }
   return builder.root;

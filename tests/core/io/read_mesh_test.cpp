@@ -168,6 +168,9 @@ TEST_F(ReadMesh, SaysWhereAFileIsNotAMesh) {
   expect_refused("a.ply", head + "end_header\n1 2\n", "expected a finite number for every property, found the end of the file");
   expect_refused("a.ply", head + "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n3 0 1 2\n",
                  "expected faces of the vertices before them, found vertex 1");
+  for (const std::string number : {"1e+38", "-2"}) {
+    expect_refused("a.ply", head + "element face 1\nproperty list uchar double vertex_indices\nend_header\n1 2 3\n3 0 " + number + " 2\n", "found vertex " + number);
+  }
   EXPECT_THROW((void)read_mesh(folder_ / "absent.obj"), Error);
 }
 
