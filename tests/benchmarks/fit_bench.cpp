@@ -1,7 +1,8 @@
 /// @file fit_bench.cpp
 /// Error of fitted skeletons by number of primitives and time, beside two plain ways to describe the same data by as many primitives:
 ///   fit      the skeleton that `supple fit` finds
-///   spheres  a union of inner spheres of the medial axis: always the one that adds most volume; all grown by the mean gap that they leave
+///   spheres  a union of inner spheres of the medial axis: always the one that adds most volume; all grown by the mean gap that they leave, and reaching as far
+///            beyond the data as suits best
 ///   equal    equal blobs at the centres of equal shares of the volume, with the radius and the iso value that suit best
 /// One JSON object per line. Distances are RMS of samples and the two-sided Hausdorff distance, over the diagonal, measured alike for all three.
 ///   fit_bench DATA [ERROR...]
@@ -13,6 +14,7 @@
 #include <filesystem>
 #include <limits>
 #include <queue>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -103,10 +105,9 @@ std::vector<Ball> largest_spheres(const Shape& shape, std::size_t count, double 
   return out;
 }
 
-/// @param error  that was asked of the fit; spheres may reach a fifth of it beyond samples, as those that a fit begins with
-Description spheres(const Shape& shape, std::size_t count, double error) {
-  constexpr double kSlack = 0.2;
-  const std::vector<Ball> balls = largest_spheres(shape, count, kSlack * error);
+/// Such spheres, all grown by the mean gap that they leave.
+Description grown_spheres(const Shape& shape, std::size_t count, double slack) {
+  const std::vector<Ball> balls = largest_spheres(shape, count, slack);
   double gap = 0.0;
   for (const Vec3& p : shape.surface.position) {
     double least = std::numeric_limits<double>::infinity();
@@ -149,22 +150,36 @@ double rms_between(const Shape& shape, const Mesh& surface) {
   return std::max(rms_of(distances(shape.surface.position, tree, shape.executor)), rms_of(distances(sample_surface(surface, Shape::kSamples).position, shape.tree, shape.executor)));
 }
 
-Description equal_blobs(const Shape& shape, std::size_t count) {
-  constexpr std::array<double, 6> kRadii{0.8, 0.95, 1.1, 1.3, 1.6, 2.0};  // of the support, over the distance between blobs
-  const std::vector<Vec3> centre = pack_points(shape.around.inside, count, shape.executor).particle;
-  const double spacing = std::cbrt(shape.volume() / static_cast<double>(count));
+/// The one of least RMS distance. @param make  a description by a value
+template <class Make>
+Description best_of(const Shape& shape, std::span<const double> values, const Make& make) {
   Description best;
   double least = std::numeric_limits<double>::infinity();
-  for (const double radius : kRadii) {
-    Description one;
-    for (const Vec3& p : centre) one.blobs.push_back({.centre = p, .axes = Vec3::Constant(radius * spacing)});
-    one.iso = best_iso(shape, one.blobs);
+  for (const double value : values) {
+    Description one = make(value);
     const double rms = rms_between(shape, one.surface(shape.executor));
     if (!(rms < least)) continue;
     least = rms;
     best = std::move(one);
   }
   return best;
+}
+
+Description spheres(const Shape& shape, std::size_t count) {
+  constexpr std::array<double, 3> kSlacks{0.003, 0.01, 0.02};  // by which spheres may reach beyond samples
+  return best_of(shape, kSlacks, [&](double slack) { return grown_spheres(shape, count, slack); });
+}
+
+Description equal_blobs(const Shape& shape, std::size_t count) {
+  constexpr std::array<double, 6> kRadii{0.8, 0.95, 1.1, 1.3, 1.6, 2.0};  // of the support, over the distance between blobs
+  const std::vector<Vec3> centre = pack_points(shape.around.inside, count, shape.executor).particle;
+  const double spacing = std::cbrt(shape.volume() / static_cast<double>(count));
+  return best_of(shape, kRadii, [&](double radius) {
+    Description out;
+    for (const Vec3& p : centre) out.blobs.push_back({.centre = p, .axes = Vec3::Constant(radius * spacing)});
+    out.iso = best_iso(shape, out.blobs);
+    return out;
+  });
 }
 
 void print_row(const Shape& shape, const std::string& name, double error, const char* method, const Description& description, double cpu_s) {
@@ -205,7 +220,7 @@ void compare(const std::filesystem::path& file, double error) {
   print_row(shape, name, error, "fit", skeleton, fitted - start);
   const std::size_t count = skeleton.blobs.size();
   double before = cpu_seconds();
-  const Description packed = spheres(shape, count, error);
+  const Description packed = spheres(shape, count);
   print_row(shape, name, error, "spheres", packed, cpu_seconds() - before);
   before = cpu_seconds();
   const Description equal = equal_blobs(shape, count);
