@@ -21,7 +21,7 @@ struct Group {
   bool names = false;  ///< the program takes the rest of a name that begins with the group
 };
 
-constexpr std::array<Group, 18> kGroups{{
+constexpr std::array<Group, 19> kGroups{{
     {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)", true},
     {"core/integrators", "integrator_bench", "time against error of every integrator; with a file name: plot (SVG)"},
     {"core/stability", "core_stress", "largest stable steps; with a file name: map (SVG)"},
@@ -39,6 +39,7 @@ constexpr std::array<Group, 18> kGroups{{
     {"collision/pile", "contact_pile", "steps of settled balls, up to 100,000; arguments: numbers of balls"},
     {"collision/conservation", "contact_conservation", "momenta and energy of free balls; arguments: number of steps"},
     {"scenes", "scene_bench", "whole scenes at an accuracy: CPU time, errors against a reference (jelly, pile_rests, slide ...); arguments: --accuracy A", true},
+    {"fit", "fit_bench", "fits of data: error by number of primitives and time, beside spheres and equal blobs; arguments: file of data, errors"},
     {"render", "render_bench", "pictures: gl (1280 x 720, 200,000 triangles), path (640 x 360, to a given noise)", true},
 }};
 

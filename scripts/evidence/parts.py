@@ -250,7 +250,7 @@ ALL = (
     Part("pictures", "Pictures", 180.0, pictures),
     Part("scenes", "Whole scenes", 1500.0, scenes),
     Part("skips", "Skips on and off", 420.0, skips),
-    Part("stability", "Stability", 420.0, stability),
+    Part("stability", "Stability", 1200.0, stability),
     Part("particles", "Scaling with particles", 300.0, particles),
     Part("bodies", "Scaling with bodies", 420.0, bodies),
     Part("conservation", "Conservation", 120.0, conservation),

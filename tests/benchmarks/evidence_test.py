@@ -13,6 +13,7 @@ SCRATCH = pathlib.Path(sys.argv.pop(1)).resolve()
 sys.path.insert(0, str(ROOT / "scripts"))
 sys.dont_write_bytecode = True
 
+import fit_curves  # noqa: E402
 from evidence import pictures, plots  # noqa: E402
 
 ROWS = """#!/bin/sh
@@ -76,6 +77,13 @@ class Figures(unittest.TestCase):
 
     def test_points_that_are_not_positive_are_left_out(self):
         self.assertEqual(plots.log_log({"a": [(1, 0), (10, 1), (100, 2)]}, "x", "y").count("<circle"), 2)
+
+    def test_curves_of_fits(self):
+        rows = fit_curves.rows_of(['no row', '{"method": "fit", "asked": 0.01, "primitives": 300, "rms": 0.001, "largest": 0.008, "cpu_s": 9}',
+                                   '{"method": "fit", "asked": 0.02, "primitives": 100, "rms": 0.002, "largest": 0.015, "cpu_s": 5}',
+                                   '{"method": "spheres", "asked": 0.02, "primitives": 100, "rms": 0.01, "largest": 0.08, "cpu_s": 2}'])
+        self.assertEqual(fit_curves.curves(rows, "primitives"), {"fit, largest": [(100, 1.5), (300, 0.8)], "fit, RMS": [(100, 0.2), (300, 0.1)], "spheres, largest": [(100, 8.0)], "spheres, RMS": [(100, 1.0)]})
+        self.assertEqual(fit_curves.table(rows)[2:], ["| 2 % | 100 | 0.20 %, 1.50 %, 5.0 | 1.00 %, 8.00 %, 2.0 | - |", "| 1 % | 300 | 0.10 %, 0.80 %, 9.0 | - | - |"])
 
     def test_difference_of_pictures(self):
         SCRATCH.mkdir(parents=True, exist_ok=True)

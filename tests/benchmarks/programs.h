@@ -18,6 +18,7 @@ int contact_thin(int argc, char** argv);
 int core_bench(int argc, char** argv);
 int core_stress(int argc, char** argv);
 int field_bench(int argc, char** argv);
+int fit_bench(int argc, char** argv);
 int integrator_bench(int argc, char** argv);
 int mesh_bench(int argc, char** argv);
 int mesh_probes(int argc, char** argv);

@@ -139,9 +139,14 @@ TEST(FitVolume, ReadsNrrd) {
   expect_ball(file);
   written("ball.raw", std::string(7, 'x') + bytes_of(ball()));
   expect_ball(written("detached.nhdr", kNrrd + "byte skip: 7\ndata file: ball.raw\n"));
-  EXPECT_EQ(message(written("header.nrrd", "NRRD0004\ntype: shot\n\n")), "header.nrrd: expected a header of NRRD, found text or bytes that are none, or that end early; the extension says how a file is read");
+  EXPECT_EQ(message(written("header.nrrd", "NRRD0004\ntype: shot\n\n")), "header.nrrd: expected a header of NRRD and the data file that it names, found none that can be read; teem says: couldn't parse type \"shot\"");
+  const std::string absent = message(written("absent.nhdr", kNrrd + "data file: absent.raw\n"));
+  EXPECT_TRUE(absent.starts_with("absent.nhdr: expected a header of NRRD and the data file that it names, found none that can be read; teem says: couldn't open")) << absent;
+  EXPECT_NE(absent.find("absent.raw\" (data file 1 of 1)"), std::string::npos) << absent;
+  EXPECT_EQ(message(written("large.nhdr", "NRRD0004\ntype: short\ndimension: 3\nsizes: 1000 1000 1000\nendian: little\nencoding: raw\ndata file: large.nhdr\n")),
+            "large.nhdr: expected at most 4e+08 voxels, found 1000 x 1000 x 1000; crop the volume, or make it coarser");
   EXPECT_EQ(message(written("short.nrrd", kNrrd + '\n' + bytes_of(ball()).substr(100))),
-            "short.nrrd: expected the voxels that the header tells of, found text or bytes that are none, or that end early; the extension says how a file is read");
+            "short.nrrd: expected the voxels that the header tells of, found fewer, or others; teem says: fread got only 17110 2-sized things, not 17160 (99.7086% of expected)");
 }
 
 TEST(FitVolume, ReadsNifti) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -53,7 +54,9 @@ DataKind kind_of(const std::filesystem::path& file) {
            extension.empty() ? "no extension" : '\'' + extension + '\'', "", ErrorKind::Usage);
   }
   std::array<std::byte, 1> first{};
-  if (!io::read_start(file, first)) (void)io::read_file(file, first.size());  // which says why
+  const std::optional<std::size_t> found = io::read_start(file, first);
+  if (!found) (void)io::read_file(file, first.size());  // which says why
+  if (found == 0) refuse(file, "expected data", "an empty file", "");
   if (extension == ".ply" && !ply_has_faces(file)) return DataKind::Points;
   return mesh ? DataKind::Mesh : volume ? DataKind::Volume : DataKind::Points;
 }

@@ -7,8 +7,10 @@
 #endif
 
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
+#include <string_view>
 
 #include "fit/data.h"
 #include "fit/meta_image.h"
@@ -19,11 +21,11 @@ namespace {
 
 constexpr double kMillimetre = 1e-3;
 
+#ifdef SUPPLE_HAS_NIFTI
 [[noreturn]] void refuse_bytes(const std::filesystem::path& file, const char* what, ErrorKind kind = ErrorKind::Scene) {
   refuse(file, std::string("expected ") + what, "text or bytes that are none, or that end early", "the extension says how a file is read", kind);
 }
 
-#ifdef SUPPLE_HAS_NIFTI
 struct FreeNifti {
   void operator()(nifti_image* image) const { nifti_image_free(image); }
 };
@@ -103,14 +105,26 @@ struct FreeNrrd {
   void operator()(NrrdIoState* state) const { nrrdIoStateNix(state); }
 };
 
-/// @param skip  reads the header only   @return null where teem refuses
-std::unique_ptr<Nrrd, FreeNrrd> load_nrrd(const std::filesystem::path& file, bool skip) {
+/// The first cause of what teem refuses: the last line of its messages, without the name of its function.
+std::string reason_of_teem() {
+  const std::unique_ptr<char, decltype(&std::free)> messages(biffGetDone(NRRD), std::free);
+  std::string out = messages ? messages.get() : "";
+  while (!out.empty() && out.back() == '\n') out.pop_back();
+  out.erase(0, out.rfind('\n') + 1);
+  constexpr std::string_view kAfterName = ": ";
+  const std::size_t name = out.find(kAfterName);
+  return name == std::string::npos ? out : out.substr(name + kAfterName.size());
+}
+
+/// @param header  reads the header only
+std::unique_ptr<Nrrd, FreeNrrd> load_nrrd(const std::filesystem::path& file, bool header) {
   std::unique_ptr<Nrrd, FreeNrrd> out(nrrdNew());
   const std::unique_ptr<NrrdIoState, FreeNrrd> state(nrrdIoStateNew());
-  state->skipData = skip ? AIR_TRUE : AIR_FALSE;
+  state->skipData = header ? AIR_TRUE : AIR_FALSE;
   if (nrrdLoad(out.get(), file.c_str(), state.get()) == 0) return out;
-  std::free(biffGetDone(NRRD));
-  return nullptr;
+  const std::string reason = "teem says: " + reason_of_teem();
+  if (header) refuse(file, "expected a header of NRRD and the data file that it names", "none that can be read", reason);
+  refuse(file, "expected the voxels that the header tells of", "fewer, or others", reason, ErrorKind::Io);
 }
 
 double length_unit(const char* text) {
@@ -136,7 +150,6 @@ void place_nrrd(const Nrrd& nrrd, Volume& volume) {
 
 Volume read_nrrd(const std::filesystem::path& file) {
   const auto header = load_nrrd(file, true);
-  if (!header) refuse_bytes(file, "a header of NRRD");
   if (header->dim != 3 || header->type == nrrdTypeBlock) refuse(file, "expected a volume of three axes and single values", std::to_string(header->dim) + " axes", "extract one");
   Volume out;
   expect_voxels(file, {static_cast<double>(header->axis[0].size), static_cast<double>(header->axis[1].size), static_cast<double>(header->axis[2].size)});
@@ -144,7 +157,6 @@ Volume read_nrrd(const std::filesystem::path& file) {
   place_nrrd(*header, out);
   expect_axes(file, out);
   const auto image = load_nrrd(file, false);
-  if (!image) refuse_bytes(file, "the voxels that the header tells of", ErrorKind::Io);
   out.value.resize(out.size());
   for (std::size_t n = 0; n < out.value.size(); ++n) out.value[n] = nrrdFLookup[image->type](image->data, n);
   return out;
