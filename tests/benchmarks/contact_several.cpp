@@ -18,7 +18,7 @@ using namespace supple;
 using namespace supple::benchmarks;
 
 constexpr int kCells = 96;
-constexpr double kOfCells = 6e-3;  // of the loads: what sums over that many cells leave
+constexpr double kOfCells = 6e-3;  // of the largest load: what sums over that many cells leave
 constexpr double kFineError = 1e-4, kStep = 2e-3;  // of the differences of the energy [m]
 
 struct Query {
@@ -73,18 +73,23 @@ double off_energy(BodiesInOnePlace& place, const LostVolumes& exact, Query& quer
 struct Figures {
   int beyond_estimate = 0, unmet = 0, energies_off = 0;
   double largest_over_estimate = 0.0, largest_energy = 0.0;
+  int worst_force = -1, worst_energy = -1;  // groups
   std::vector<double> cpu_us, over_alone;
 
-  void add(const ContactsOfBodies& found, const LostVolumes& exact, const LostVolumes& rough, double error) {
+  void add(int group, const ContactsOfBodies& found, const LostVolumes& exact, const LostVolumes& rough, double error) {
     unmet += found.largest_estimate > 1.01 * error ? 1 : 0;
     bool beyond = false;
+    const double largest_load = *std::max_element(exact.load.begin(), exact.load.end());
     for (std::size_t b = 0; b < found.force.size(); ++b) {
-      const double left = kOfCells * exact.load[b] + (exact.force[b] - rough.force[b]).norm(), off = (found.force[b] - exact.force[b]).norm() - left;
+      const double left = kOfCells * largest_load + (exact.force[b] - rough.force[b]).norm(), off = (found.force[b] - exact.force[b]).norm() - left;
       beyond = beyond || off > found.off[b];
-      if (off > 0.0) largest_over_estimate = std::max(largest_over_estimate, off / std::max(found.off[b], std::numeric_limits<double>::min()));
+      const double over = off > 0.0 ? off / std::max(found.off[b], std::numeric_limits<double>::min()) : 0.0;
+      if (over > largest_over_estimate) worst_force = group;
+      largest_over_estimate = std::max(largest_over_estimate, over);
     }
     beyond_estimate += beyond ? 1 : 0;
     const double energy = exact.energy > 0.0 ? std::abs(found.energy / exact.energy - 1.0) : 0.0;
+    if (energy > largest_energy) worst_energy = group;
     largest_energy = std::max(largest_energy, energy);
     energies_off += energy > error + kOfCells ? 1 : 0;
   }
@@ -94,10 +99,10 @@ struct Figures {
   }
   void print(int bodies, double error, double slope_off) const {
     std::printf("{\"name\": \"collision/several/%d/error=%g\", \"groups\": %zu, \"cpu_us_median\": %.0f, \"cpu_us_worst\": %.0f, \"over_pairs_alone_median\": %.2g, "
-                "\"unmet\": %d, \"forces_beyond_estimate\": %d, \"worst_force_over_estimate\": %.2g, \"energies_off\": %d, \"worst_energy\": %.2g, "
-                "\"worst_force_less_energy_slope\": %.2g}\n",
+                "\"unmet\": %d, \"forces_beyond_estimate\": %d, \"worst_force_over_estimate\": %.2g, \"of_group\": %d, \"energies_off\": %d, \"worst_energy\": %.2g, "
+                "\"of_energy_of_group\": %d, \"worst_force_less_energy_slope\": %.2g}\n",
                 bodies, error, cpu_us.size(), middle(cpu_us), *std::max_element(cpu_us.begin(), cpu_us.end()), middle(over_alone), unmet, beyond_estimate,
-                largest_over_estimate, energies_off, largest_energy, slope_off);
+                largest_over_estimate, worst_force, energies_off, largest_energy, worst_energy, slope_off);
     std::fflush(stdout);
   }
 };
@@ -112,7 +117,7 @@ void measure(int count, int groups, std::uint64_t seed) {
     const std::vector<collision::ContactBody> bodies = place.bodies();
     const LostVolumes exact = lost_volumes(bodies, kCells), rough = lost_volumes(bodies, kCells / 2);
     for (std::size_t k = 0; k < kErrors.size(); ++k) {
-      figures[k].add(ContactsOfBodies(bodies.size(), query.ask(bodies, kErrors[k], 3)), exact, rough, kErrors[k]);
+      figures[k].add(n, ContactsOfBodies(bodies.size(), query.ask(bodies, kErrors[k], 3)), exact, rough, kErrors[k]);
       figures[k].cpu_us.push_back(query.cpu_us);
       figures[k].over_alone.push_back(figures[k].cpu_us.back() / time_alone(bodies, kErrors[k], query));
     }

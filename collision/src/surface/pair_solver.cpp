@@ -376,12 +376,14 @@ bool PairSolver::solve_in_order(const Job& job, Rule& rule, ContactRule name, co
   return true;
 }
 
-bool PairSolver::march(const Job& job, PairResult& out) {
+/// @param alone  as if there were no third bodies
+bool PairSolver::march(const Job& job, PairResult& out, bool alone) {
   const ContactSettings& settings = job.settings();
   PairPressure& pressure = job.polar.pressure;
   return solve_in_order(job, march_, ContactRule::March, [&](const Regions& regions, const Vec3& reference) {
-    const bool alone = settings.symmetry && third_bodies_.empty();
-    const std::optional<CommonAxis> axis = alone ? axis_of_symmetry(pressure.body(0), pressure.body(1), job.overlap) : std::nullopt;
+    if (alone) third_bodies_.clear();
+    const bool symmetric = settings.symmetry && third_bodies_.empty();
+    const std::optional<CommonAxis> axis = symmetric ? axis_of_symmetry(pressure.body(0), pressure.body(1), job.overlap) : std::nullopt;
     return march_.solve({pressure, third_bodies_, job.overlap, regions, reference, axis, {settings.error, settings.max_refinement}}, out.points);
   }, out);
 }
@@ -473,6 +475,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   }
   if (!fits) {
     fits = only != ContactRule::Polar && march(job, out);
+    if (!fits && any && !third_.empty() && march(job, out, true) && thirds_press(job, out) == Pressing::All) return fill_beyond_thirds(job, out);
     if (!fits) {
       begin_anew(job, out);
       if (only == ContactRule::Polar || may_be_missed) out.summary.error_estimate = 1.0;

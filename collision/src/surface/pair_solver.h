@@ -70,7 +70,7 @@ class PairSolver {
   bool polar_cut(const Job& job, PairResult& out);
   std::optional<double> taken_by_imprints(const Job& job, double most, const PairResult& out);
   bool may_leave_imprints(const Job& job, PairResult& out);
-  bool march(const Job& job, PairResult& out);
+  bool march(const Job& job, PairResult& out, bool alone = false);
   bool panels(const Job& job, PairResult& out);
   bool march_instead(const Job& job, PairResult& out);
   [[nodiscard]] bool suits_panels(const Job& job) const;

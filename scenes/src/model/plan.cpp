@@ -306,10 +306,10 @@ bool choose_by_accuracy(const Scene& scene, const Model& model, const StepCounts
   const double implicit_steps = counts.of(counts.resolved(plan.pair_frequency), rules.implicit_steps);
   const bool dissipates = explicit_steps > stable, touches = model.contact_frequency > 0.0;
   const bool dies_out = !model.interactions.stiffness_damping.empty() && plan.damping_rate >= plan.pair_frequency;
-  const double cost = dies_out     ? kDampedStepCost
-                      : touches    ? kImplicitStepCost
-                      : dissipates ? implicit_pair_cost(model.particles.size())
-                                   : kImplicitCost;
+  const double cost = dies_out      ? kDampedStepCost
+                      : !dissipates ? kImplicitCost
+                      : touches     ? kImplicitStepCost
+                                    : implicit_pair_cost(model.particles.size());
   const bool refused = explicit_steps > scene.time_step.max_substeps;
   const bool implicit = suits_implicit(model) && (refused || explicit_steps > cost * implicit_steps);
   plan.settings.method = implicit ? core::Integrator::ImplicitMidpoint : core::Integrator::Symplectic;

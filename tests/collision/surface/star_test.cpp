@@ -85,6 +85,8 @@ void expect_forces_and_energy_of_volumes(int bodies_each, int groups, std::uint6
 }
 
 TEST(Star, OfRandomTriplesHasTheForcesAndTheEnergyOfTheVolumesThatTheyLose) { expect_forces_and_energy_of_volumes(3, 10, 100); }
+/// One of three, as one pair of them meets on a closed surface that lies in the third body.
+TEST(Star, LiesInTheThirdBodyWithAllOfAClosedSurface) { expect_forces_and_energy_of_volumes(3, 1, 2026 + 49); }
 TEST(Star, OfRandomQuadruplesHasTheForcesAndTheEnergyOfTheVolumesThatTheyLose) { expect_forces_and_energy_of_volumes(4, 5, 200); }
 
 }  // namespace

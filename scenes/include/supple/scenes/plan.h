@@ -97,7 +97,7 @@ struct IntegratorPlan {
 /// With `accuracy` it chooses velocity Verlet or implicit midpoint, whichever reaches it at less cost. Explicit steps must be short for stability, for
 /// friction, which they blur below a speed that grows with the step, and for the damping of pairs, whose half steps let what is damped faster than a step
 /// relax too fast. A step of implicit midpoint counts as kImplicitStepCost explicit ones where bodies touch and as `implicit_pair_cost` elsewhere; where
-/// nothing touches and stability limits explicit steps, what does are vibrations, whose phase implicit ones would lose, and it counts as kImplicitCost. The method
+/// stability limits explicit steps, what does are vibrations, whose phase implicit ones would lose, and it counts as kImplicitCost. The method
 /// `implicit` is implicit midpoint in steps that resolve contact: of second order, it needs an eighth of the steps of backward Euler for the
 /// same error. Where the scene fixes steps that are longer than contacts last, it is backward Euler, which is stable there.
 [[nodiscard]] IntegratorPlan plan_integrator(const Scene& scene, const Model& model);
