@@ -1,6 +1,7 @@
 /// Stars: panels in angle and radius about a point that sees the rim of a patch, cut where third bodies press harder.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -85,6 +86,25 @@ void expect_forces_and_energy_of_volumes(int bodies_each, int groups, std::uint6
 }
 
 TEST(Star, OfRandomTriplesHasTheForcesAndTheEnergyOfTheVolumesThatTheyLose) { expect_forces_and_energy_of_volumes(3, 10, 100); }
+TEST(Star, CountsNoEnergyTwiceWhereAThirdBodyPressesBesideSigma) {
+  struct Ball {
+    double modulus, support;
+    Vec3 at;
+  };
+  const std::array balls{Ball{3.28, 0.395, Vec3(-0.084, 0.077, -0.098)}, Ball{1.99, 0.432, Vec3(0.063, 0.078, -0.194)}, Ball{2.56, 0.474, Vec3(0.001, 0.059, -0.127)}};
+  std::vector<benchmarks::Rigid> rigid;
+  rigid.reserve(balls.size());
+  std::vector<ContactBody> bodies;
+  for (const Ball& ball : balls) {
+    rigid.emplace_back(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), ball.support), ball.modulus, 0.05);
+    rigid.back().put({ball.at, Quat::Identity()});
+    bodies.push_back(rigid.back().body());
+  }
+  const benchmarks::LostVolumes exact = benchmarks::lost_volumes(bodies, 96);
+  const benchmarks::ContactsOfBodies found(bodies.size(), query(bodies, 1e-3));
+  EXPECT_NEAR(found.energy, exact.energy, 5e-3 * exact.energy);
+}
+
 /// One of three, as one pair of them meets on a closed surface that lies in the third body.
 TEST(Star, LiesInTheThirdBodyWithAllOfAClosedSurface) { expect_forces_and_energy_of_volumes(3, 1, 2026 + 49); }
 TEST(Star, OfRandomQuadruplesHasTheForcesAndTheEnergyOfTheVolumesThatTheyLose) { expect_forces_and_energy_of_volumes(4, 5, 200); }
