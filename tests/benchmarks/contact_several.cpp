@@ -10,6 +10,7 @@
 
 #include "programs.h"
 #include "several_bodies.h"
+#include "timed_query.h"
 #include "usage.h"
 
 namespace {
@@ -21,26 +22,8 @@ constexpr int kCells = 96;
 constexpr double kOfCells = 6e-3;  // of the largest load: what sums over that many cells leave
 constexpr double kFineError = 1e-4, kStep = 2e-3;  // of the differences of the energy [m]
 
-struct Query {
-  collision::ContactCandidates candidates;
-  collision::ContactSurface surface;
-  double cpu_us = 0.0;
-
-  const std::vector<collision::ContactSurface::Summary>& ask(std::span<const collision::ContactBody> bodies, double error, int repeats = 1) {
-    const Executor executor(1);
-    cpu_us = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < repeats; ++i) {
-      const double start = cpu_microseconds();
-      find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
-      solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
-      cpu_us = std::min(cpu_us, cpu_microseconds() - start);
-    }
-    return surface.summary;
-  }
-};
-
 /// Of all pairs, each without the other bodies.
-double time_alone(std::span<const collision::ContactBody> bodies, double error, Query& query) {
+double time_alone(std::span<const collision::ContactBody> bodies, double error, TimedQuery& query) {
   double sum = 0.0;
   for (std::size_t a = 0; a < bodies.size(); ++a) {
     for (std::size_t b = a + 1; b < bodies.size(); ++b) {
@@ -53,7 +36,7 @@ double time_alone(std::span<const collision::ContactBody> bodies, double error, 
 }
 
 /// Largest difference of the force on the first body and the slope of the energy, over the force's load.
-double off_energy(BodiesInOnePlace& place, const LostVolumes& exact, Query& query) {
+double off_energy(BodiesInOnePlace& place, const LostVolumes& exact, TimedQuery& query) {
   Vec3 slope;
   for (Eigen::Index k = 0; k < 3; ++k) {
     std::array<double, 2> energy{};
@@ -111,7 +94,7 @@ void measure(int count, int groups, std::uint64_t seed) {
   constexpr std::array<double, 3> kErrors{1e-2, 1e-3, 1e-4};
   std::array<Figures, kErrors.size()> figures;
   double slope_off = 0.0;
-  Query query;
+  TimedQuery query;
   for (int n = 0; n < groups; ++n) {
     BodiesInOnePlace place(count, seed + static_cast<std::uint64_t>(n));
     const std::vector<collision::ContactBody> bodies = place.bodies();

@@ -12,6 +12,7 @@
 
 #include "programs.h"
 #include "thin_cases.h"
+#include "timed_query.h"
 #include "usage.h"
 
 namespace {
@@ -22,20 +23,9 @@ using namespace supple::benchmarks;
 constexpr double kRound = 0.1, kE = 1e6;
 constexpr std::array<double, 2> kErrors{1e-3, 1e-6};
 
-struct Query {
-  collision::ContactCandidates candidates;
-  collision::ContactSurface surface;
-  double cpu_us = 0.0;
-
+struct Query : TimedQuery {
   collision::ContactSurface::Summary ask(const std::array<collision::ContactBody, 2>& bodies, double error, int repeats) {
-    const Executor executor(1);
-    cpu_us = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < repeats; ++i) {
-      const double start = cpu_microseconds();
-      find_contacts(bodies, collision::broad_phase(bodies, {}, executor), executor, candidates);
-      solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
-      cpu_us = std::min(cpu_us, cpu_microseconds() - start);
-    }
+    TimedQuery::ask(bodies, error, repeats);
     return surface.summary.empty() ? collision::ContactSurface::Summary{} : surface.summary.front();
   }
 };
