@@ -81,6 +81,7 @@ struct Task {
   std::span<const Box> near;
   SampleState& state;
   SurfaceSamples& out;
+  RigidSamples* rigid;
 
   [[nodiscard]] bool is_near(const Vec3& from, const Vec3& along, double reach) const {
     return near.empty() || std::any_of(near.begin(), near.end(), [&](const Box& box) { return ray_meets(box, from, along, reach); });
@@ -92,8 +93,31 @@ class BlockProjector {
   BlockProjector(const Task& task, Scratch& scratch) : task_(task), scratch_(scratch) {}
 
   void project(std::size_t begin, std::size_t end) {
-    count_ = 0;
     clear(begin, end);
+    gather(begin, end);
+    if (count_ == 0) return;
+    task_.out.written[begin / kBlock] = 1;
+    if (task_.rigid == nullptr) {
+      find();
+    } else {
+      if (task_.rigid->found[begin / kBlock] == 0) {
+        find_rigid(begin, end);
+        gather(begin, end);
+      }
+      move();
+    }
+    for (std::size_t i = 0; i < count_; ++i) finish(scratch_.seeds[i]);
+  }
+  [[nodiscard]] std::size_t visited() const { return count_; }
+  [[nodiscard]] std::size_t failures() const {
+    return static_cast<std::size_t>(std::count_if(scratch_.seeds.begin(), scratch_.seeds.begin() + static_cast<std::ptrdiff_t>(count_),
+                                                  [&](const Seed& seed) { return task_.state.distance[seed.id] < 0.0; }));
+  }
+
+ private:
+  /// The seeds that come near.
+  void gather(std::size_t begin, std::size_t end) {
+    count_ = 0;
     for (std::size_t s = begin; s < end; ++s) {
       if (!task_.active.empty() && task_.active[task_.layout.part[s]] == 0) continue;
       const Pose& pose = task_.parts[task_.layout.part[s]];
@@ -108,8 +132,9 @@ class BlockProjector {
       seed.first_t = -1.0;
       seed.valid = false;
     }
-    if (count_ == 0) return;
-    task_.out.written[begin / kBlock] = 1;
+  }
+
+  void find() {
     find_exits();
     for (;;) {
       scratch_.open.clear();
@@ -123,15 +148,27 @@ class BlockProjector {
       find_roots();
       check_territories();
     }
-    for (std::size_t i = 0; i < count_; ++i) finish(scratch_.seeds[i]);
-  }
-  [[nodiscard]] std::size_t visited() const { return count_; }
-  [[nodiscard]] std::size_t failures() const {
-    return static_cast<std::size_t>(std::count_if(scratch_.seeds.begin(), scratch_.seeds.begin() + static_cast<std::ptrdiff_t>(count_),
-                                                  [&](const Seed& seed) { return task_.state.distance[seed.id] < 0.0; }));
   }
 
- private:
+  /// All seeds of the block, in the frame of the part.
+  void find_rigid(std::size_t begin, std::size_t end) {
+    RigidSamples& rigid = *task_.rigid;
+    static const Pose kOwnFrame;
+    const FieldView field = rigid.field;
+    const Task own{task_.skeleton, task_.layout, {&kOwnFrame, 1}, field, {}, {}, rigid.state, rigid.samples, nullptr};
+    BlockProjector(own, scratch_).project(begin, end);
+    rigid.found[begin / kBlock] = 1;
+  }
+
+  void move() {
+    for (std::size_t i = 0; i < count_; ++i) {
+      Seed& seed = scratch_.seeds[i];
+      seed.t = seed.first_t = task_.rigid->state.distance[seed.id];
+      seed.gradient = seed.first_gradient = -(task_.parts[0].orientation * task_.rigid->samples.normal[seed.id]);
+      seed.valid = task_.rigid->samples.valid[seed.id] != 0;
+    }
+  }
+
   void clear(std::size_t begin, std::size_t end) {
     std::uint8_t& written = task_.out.written[begin / kBlock];
     if (written == 0) return;
@@ -316,21 +353,40 @@ void SampleState::save(StateWriter& out) const { out.write(std::span<const doubl
 void SampleState::load(StateReader& in) { in.read(distance); }
 void SampleState::hash(Hasher& hasher) const { hasher.add(std::span<const double>(distance)); }
 
+namespace {
+
+void prepare(std::size_t seeds, SampleState& state, SurfaceSamples& out) {
+  if (state.distance.size() != seeds) state.distance.assign(seeds, -1.0);
+  const std::size_t blocks = (seeds + kBlock - 1) / kBlock;
+  if (out.point.size() == seeds && out.written.size() == blocks) return;
+  out.point.assign(seeds, Vec3::Zero());
+  out.normal.assign(seeds, Vec3::Zero());
+  out.area.assign(seeds, 0.0);
+  out.valid.assign(seeds, 0);
+  out.written.assign(blocks, 0);
+}
+
+void prepare(const SampledBody& body, RigidSamples& rigid) {
+  const std::size_t seeds = body.layout.size();
+  if (rigid.samples.point.size() == seeds) return;
+  const Pose own_frame;
+  place_skeleton(body.skeleton, {&own_frame, 1}, rigid.placed);
+  index_field(body.skeleton, rigid.placed, rigid.field);
+  prepare(seeds, rigid.state, rigid.samples);
+  rigid.found.assign(rigid.samples.written.size(), 0);
+}
+
+}  // namespace
+
 void sample_surface(const SampledBody& body, const SampledRegion& region, const Executor& executor, SampleState& state,
                     SurfaceSamples& out) {
   SUPPLE_EXPECTS(body.parts.size() == body.skeleton.part_count);
   SUPPLE_EXPECTS(region.active.empty() || region.active.size() == body.parts.size());
+  SUPPLE_EXPECTS(body.rigid == nullptr || body.parts.size() == 1);
   const std::size_t n = body.layout.size();
-  if (state.distance.size() != n) state.distance.assign(n, -1.0);
-  const std::size_t blocks = (n + kBlock - 1) / kBlock;
-  if (out.point.size() != n || out.written.size() != blocks) {
-    out.point.assign(n, Vec3::Zero());
-    out.normal.assign(n, Vec3::Zero());
-    out.area.assign(n, 0.0);
-    out.valid.assign(n, 0);
-    out.written.assign(blocks, 0);
-  }
-  const Task task{body.skeleton, body.layout, body.parts, body.field, region.active, region.near, state, out};
+  prepare(n, state, out);
+  if (body.rigid != nullptr) prepare(body, *body.rigid);
+  const Task task{body.skeleton, body.layout, body.parts, body.field, region.active, region.near, state, out, body.rigid};
   struct Job {
     const Task& task;
     std::atomic<std::uint64_t> visited{0}, failures{0};

@@ -106,6 +106,7 @@ Frame::Frame(const Model& model, const std::vector<Body>& all)
       active(all.size()),
       shared(all.size()),
       samples(all.size()),
+      rigid_samples(all.size()),
       led(model.fixed.size()),
       bodies(reach.size()),
       loads(reach.size()),

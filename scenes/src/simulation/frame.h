@@ -74,6 +74,7 @@ struct Frame {
   std::vector<std::vector<std::uint8_t>> active;
   std::vector<std::vector<Box>> shared;               ///< boxes shared with other bodies, in which rays search
   std::vector<implicit::SurfaceSamples> samples;
+  std::vector<implicit::RigidSamples> rigid_samples;  ///< of bodies of one part whose kernels do not change
   std::vector<LedSolid> led;                          ///< shape [fixed bodies]
   // find_contacts, solve_contact_surface, react
   std::vector<collision::ContactBody> bodies;         ///< and the fixed ones after them

@@ -245,7 +245,8 @@ void sample_surface(const StageContext& context, std::vector<implicit::SampleSta
       continue;
     }
     const Body& body = context.bodies[i];
-    implicit::sample_surface({body.skeleton, body.samples, frame.pose[i], frame.field[i]}, {frame.active[i], frame.shared[i]},
+    const bool rigid = body.skeleton.part_count == 1 && !context.model.objects[body.object].holds_volume;
+    implicit::sample_surface({body.skeleton, body.samples, frame.pose[i], frame.field[i], rigid ? &frame.rigid_samples[i] : nullptr}, {frame.active[i], frame.shared[i]},
                              context.executor, samples[i], frame.samples[i]);
     profile.visited += frame.samples[i].visited;
   }

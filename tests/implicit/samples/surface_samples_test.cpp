@@ -411,6 +411,43 @@ TEST(SurfaceSamples, NearABoxAreThoseOfAllThatLieThere) {
   EXPECT_LT(some.visited, all.visited / 2);
 }
 
+// Samples of a rigid body move with it: they are those of a new search, and do not depend on what was asked for before.
+TEST(RigidSamples, AreThoseOfANewSearchWhereverTheBodyIs) {
+  Body body = random_body({.seed = 21, .parts = 1, .primitives_per_part = 8, .every_shape = true});
+  const SampleLayout layout = make_sample_layout(body.skeleton, 0.1);
+  const Executor executor(2);
+  RigidSamples kept;
+  Random random(6);
+  std::size_t valid = 0;
+  for (int step = 0; step < 8; ++step) {
+    body.parts[0] = {2.0 * random.in_box(1.0), Quat(Eigen::AngleAxisd(3.0 * step, random.direction()))};
+    body.place();
+    const Vec3 corner = body.parts[0].position;
+    const std::array boxes{Box{corner, corner + Vec3::Constant(0.3 * step)}};
+    const SampledRegion region{{}, step == 7 ? std::span<const Box>() : boxes};
+    SampleState searched_state, moved_state, fresh_state;
+    SurfaceSamples searched, moved, fresh;
+    RigidSamples unused;
+    sample_surface({body.skeleton, layout, body.parts, body.field}, region, executor, searched_state, searched);
+    sample_surface({body.skeleton, layout, body.parts, body.field, &kept}, region, executor, moved_state, moved);
+    sample_surface({body.skeleton, layout, body.parts, body.field, &unused}, region, executor, fresh_state, fresh);
+    EXPECT_EQ(moved_state.distance, fresh_state.distance);
+    EXPECT_EQ(moved.point, fresh.point);
+    EXPECT_EQ(moved.area, fresh.area);
+    EXPECT_EQ(moved.valid, searched.valid);
+    EXPECT_EQ(moved.visited, searched.visited);
+    EXPECT_EQ(moved.failures, searched.failures);
+    for (std::size_t s = 0; s < layout.size(); ++s) {
+      // Round-off of places about 3 away, over the least slope of the field along a ray.
+      EXPECT_NEAR(moved_state.distance[s], searched_state.distance[s], 1e-12 * layout.reach[s]);
+      EXPECT_LT((moved.normal[s] - searched.normal[s]).norm(), 1e-10);
+      EXPECT_NEAR(moved.area[s], searched.area[s], 1e-10 * layout.reach[s] * layout.reach[s]);
+      valid += moved.valid[s];
+    }
+  }
+  EXPECT_GT(valid, 1000u);
+}
+
 TEST(SampleState, SurvivesSavingAndLoading) {
   const Body body = random_body({.seed = 10, .parts = 4});
   const Sampled sampled(body, 0.3);

@@ -63,12 +63,23 @@ struct SurfaceSamples {
   std::uint64_t failures = 0;        ///< seeds without a root
 };
 
+/// Samples of a body of one part, in the frame of that part: those of a block of seeds are found when one of them is asked for first, and move with
+/// the part. For one skeleton and one layout, which must not change.
+struct RigidSamples {
+  PlacedSkeleton placed;
+  Field field;
+  SampleState state;
+  SurfaceSamples samples;
+  std::vector<std::uint8_t> found;  ///< 1: this block of seeds is found
+};
+
 /// A body whose surface is sampled.
 struct SampledBody {
   const Skeleton& skeleton;
   const SampleLayout& layout;
   std::span<const Pose> parts;  ///< world poses, shape [part_count]
   const FieldView& field;
+  RigidSamples* rigid = nullptr;  ///< of this body, which then has one part; saves the search for roots
 };
 
 /// Where a surface is sampled; empty: everywhere.
@@ -81,7 +92,7 @@ struct SampledRegion {
 /// distance and are marked invalid. The distance is a function of the poses alone up to 1e-13 reach: of the roots where the ray leaves
 /// the body, the outermost in the seed's own territory, else the outermost. Roots are bracketed by fixed stations at
 /// most a quarter of the field's feature size apart (32 intervals at most; dips and humps between stations are looked
-/// into); the kept distance is but the start of the iteration.
+/// into); the kept distance is but the start of the iteration. With `rigid`, distances are those in the frame of the part.
 void sample_surface(const SampledBody& body, const SampledRegion& region, const Executor& executor, SampleState& state,
                     SurfaceSamples& out);
 
