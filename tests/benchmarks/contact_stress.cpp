@@ -5,19 +5,23 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <random>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "programs.h"
 #include "scenes/contact_stress.h"
+#include "supple/core/executor.h"
 #include "usage.h"
 
 namespace {
 
 using namespace supple::scenes;
+using supple::Executor;
 using stress::Outcome;
 using stress::Result;
 
@@ -35,6 +39,13 @@ struct Block {
   std::size_t columns;
   std::vector<Result> results;  // row by row
 };
+
+/// The results in the order of the runs, which share the processors.
+std::vector<Result> all_of(const std::vector<std::function<Result()>>& runs) {
+  std::vector<Result> results(runs.size());
+  Executor().for_blocks(runs.size(), 1, [&](std::size_t begin, std::size_t) { results[begin] = runs[begin](); });
+  return results;
+}
 
 void print(const Block& b) {
   std::map<Outcome, int> count;
@@ -96,49 +107,44 @@ int supple::benchmarks::programs::contact_stress(int argc, char** argv) {
     }
   }
   std::vector<Block> blocks;
+  const auto run = [&blocks](std::string name, std::size_t columns, const std::vector<std::function<Result()>>& runs) {
+    blocks.push_back({std::move(name), columns, all_of(runs)});
+    print(blocks.back());
+  };
   std::printf("| what | runs | valid | held | overloaded, told | gains energy | passes untold | stops | energy error of the held |\n"
               "|---|---|---|---|---|---|---|---|---|\n");
-  Block meet{"two balls meet at 1, 5, 20, 50 radii/s", kRatio.size() * kSpeed.size(), {}};
+  std::vector<std::function<Result()>> meetings, stacks, squeezes, shots, cores;
   for (const double E : kModulus) {
     for (const double speed : kSpeed) {
-      for (const double ratio : kRatio) meet.results.push_back(stress::meet(E, ratio, speed));
+      for (const double ratio : kRatio) meetings.emplace_back([=] { return stress::meet(E, ratio, speed); });
+    }
+    for (const double ratio : kRatio) {
+      stacks.emplace_back([=] { return stress::stack(E, ratio); });
+      squeezes.emplace_back([=] { return stress::squeeze(E, ratio); });
     }
   }
-  print(meet);
-  blocks.push_back(meet);
-  Block stack{"a stack of ten, heavier upward", kRatio.size(), {}};
-  for (const double E : kModulus) {
-    for (const double ratio : kRatio) stack.results.push_back(stress::stack(E, ratio));
-  }
-  print(stack);
-  blocks.push_back(stack);
-  Block squeeze{"a ball between two plates, to half its diameter", kRatio.size(), {}};
-  for (const double E : kModulus) {
-    for (const double ratio : kRatio) squeeze.results.push_back(stress::squeeze(E, ratio));
-  }
-  print(squeeze);
-  blocks.push_back(squeeze);
+  run("two balls meet at 1, 5, 20, 50 radii/s", kRatio.size() * kSpeed.size(), meetings);
+  run("a stack of ten, heavier upward", kRatio.size(), stacks);
+  run("a ball between two plates, to half its diameter", kRatio.size(), squeezes);
 
   std::mt19937 random(seed);
   const auto uniform = [&random](double low, double high) {
     return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
   };
-  Block shots{"a thousand shots at a thin plate, up to 600 m/s", 50, {}};
-  for (int k = 0; k < 1000; ++k) {
+  const auto draw_shot = [&uniform] {
     const double speed = uniform(10.0, 600.0);
-    shots.results.push_back(stress::shoot(speed, 0.1 + speed * 1e-3 * uniform(0.0, 1.0)));
-  }
-  print(shots);
-  blocks.push_back(shots);
-  Block cores{"the same against hard cores, 10,000 times softer", 50, {}};
+    return std::pair(speed, 0.1 + speed * 1e-3 * uniform(0.0, 1.0));
+  };
+  for (int k = 0; k < 1000; ++k) shots.emplace_back([shot = draw_shot()] { return stress::shoot(shot.first, shot.second); });
   for (int k = 0; k < 1000; ++k) {
-    const double speed = uniform(10.0, 600.0);
-    Result r = stress::shoot(speed, 0.1 + speed * 1e-3 * uniform(0.0, 1.0), "contact: {core: barrier, error: 0.01}\n", 1e4);
-    r.valid = false;
-    cores.results.push_back(r);
+    cores.emplace_back([shot = draw_shot()] {
+      Result r = stress::shoot(shot.first, shot.second, "contact: {core: barrier, error: 0.01}\n", 1e4);
+      r.valid = false;
+      return r;
+    });
   }
-  print(cores);
-  blocks.push_back(cores);
+  run("a thousand shots at a thin plate, up to 600 m/s", 50, shots);
+  run("the same against hard cores, 10,000 times softer", 50, cores);
   int wrong = 0;
   for (const Block& b : blocks) {
     for (const Result& r : b.results) wrong += bad(r) ? 1 : 0;

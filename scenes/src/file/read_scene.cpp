@@ -8,12 +8,12 @@
 #include <span>
 #include <vector>
 
-#include "file/expand_scene.h"
+#include "file/expand/expand_scene.h"
 #include "file/read_scene_archive.h"
-#include "file/scale_object.h"
-#include "file/scene_keys.h"
+#include "file/expand/scale_object.h"
+#include "file/fields/scene_keys.h"
 #include "file/scene_places.h"
-#include "file/short_keys.h"
+#include "file/expand/short_keys.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/accuracy.h"
 

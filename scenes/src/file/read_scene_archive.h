@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "file/fields_info.h"
+#include "file/fields/fields_info.h"
 #include "file/named_files.h"
 #include "file/read_scene_faults.h"
-#include "file/yaml_tree.h"
+#include "file/yaml/yaml_tree.h"
 
 namespace supple::scenes {
 

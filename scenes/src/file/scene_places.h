@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "file/named_files.h"
-#include "file/yaml_tree.h"
+#include "file/yaml/yaml_tree.h"
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/scene.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "file/fields_particles.h"
+#include "file/fields/fields_particles.h"
 #include "supple/core/error.h"
 #include "supple/core/integrate.h"
 #include "supple/core/io/particle_files.h"

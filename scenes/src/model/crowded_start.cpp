@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "file/fields_particles.h"
+#include "file/fields/fields_particles.h"
 #include "model/arrangement.h"
 #include "supple/core/arrange.h"
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "file/course.h"
+#include "file/expand/course.h"
 #include "supple/scenes/solid_motion.h"
 
 namespace supple::scenes {

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <span>
 
-#include "file/course.h"
+#include "file/expand/course.h"
 #include "model/arrangement.h"
 #include "model/led_pins.h"
 #include "model/material.h"

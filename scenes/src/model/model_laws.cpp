@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "file/fields_rules.h"
+#include "file/fields/fields_rules.h"
 #include "supple/core/arrange.h"
 
 namespace supple::scenes {

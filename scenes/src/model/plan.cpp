@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "file/fields_rules.h"
+#include "file/fields/fields_rules.h"
 #include "file/read_scene_faults.h"
 #include "model/model_contact.h"
 #include "supple/implicit/mesh_routes.h"

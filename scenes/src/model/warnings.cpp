@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "file/fields_rules.h"
+#include "file/fields/fields_rules.h"
 #include "file/read_scene_faults.h"
 #include "model/model_contact.h"
 #include "output/meshes/search_choice.h"

@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "file/scene_keys.h"
+#include "file/fields/scene_keys.h"
 #include "output/run/program_identity.h"
 #include "supple/core/io/atomic_file.h"
 

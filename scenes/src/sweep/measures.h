@@ -14,7 +14,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "file/fields_archive.h"
+#include "file/fields/fields_archive.h"
 #include "supple/scenes/sweep.h"
 
 namespace supple::scenes {

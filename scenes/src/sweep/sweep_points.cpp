@@ -13,7 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "file/yaml_quantity.h"
+#include "file/yaml/yaml_quantity.h"
 #include "output/files/folder_lock.h"
 #include "output/run/program_identity.h"
 #include "supple/core/error.h"

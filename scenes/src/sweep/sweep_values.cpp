@@ -10,8 +10,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "file/yaml_quantity.h"
-#include "file/yaml_tree.h"
+#include "file/yaml/yaml_quantity.h"
+#include "file/yaml/yaml_tree.h"
 #include "supple/core/error.h"
 #include "supple/core/math.h"
 #include "supple/scenes/sweep.h"

@@ -9,6 +9,7 @@
 
 #include "core/support.h"
 #include "core/two_bodies.h"
+#include "supple/core/arrange.h"
 
 namespace supple::core {
 namespace {
@@ -125,22 +126,25 @@ TEST(PairHessian, RaisesBothCoefficientsOfACentralLaw) {
   EXPECT_DOUBLE_EQ(stretched(1, 7), law.force(2.0) / 2.0);
 }
 
-/// Particles on a circle or sphere of radius 1 with outward normals, bonded to their nearest neighbours.
-struct Closed {
-  std::vector<Vec3> position;
+/// Particles with normals, and bonds.
+struct Structure {
+  std::vector<Vec3> position, normal;
   std::vector<std::pair<int, int>> bonds;
 
-  static Closed ring(int count) {
-    Closed out;
+  /// On a circle of radius 1 with outward normals, bonded to their nearest neighbours.
+  static Structure ring(int count) {
+    Structure out;
     for (int k = 0; k < count; ++k) {
       const double angle = 2.0 * std::numbers::pi * k / count;
       out.position.emplace_back(std::cos(angle), std::sin(angle), 0.0);
       out.bonds.emplace_back(std::min(k, (k + 1) % count), std::max(k, (k + 1) % count));
     }
+    out.normal = out.position;
     return out;
   }
-  static Closed icosahedron() {
-    Closed out;
+  /// The same on a sphere.
+  static Structure icosahedron() {
+    Structure out;
     for (const double one : {1.0, -1.0}) {
       for (const double golden : {std::numbers::phi, -std::numbers::phi}) {
         for (int axis = 0; axis < 3; ++axis) {
@@ -158,13 +162,24 @@ struct Closed {
         }
       }
     }
+    out.normal = out.position;
+    return out;
+  }
+  /// The spiral of figure 5 in its plane, normals along the axis. @param neighbours  bonds join particles whose numbers differ by at most this
+  static Structure spiral(int neighbours) {
+    Structure out;
+    out.position = arrange_spiral(10, 0.15, 0.55, 1.2, NormalDirection::Axis).position;
+    out.normal.assign(out.position.size(), Vec3::UnitZ());
+    for (int a = 0; a < 10; ++a) {
+      for (int b = a + 1; b < std::min(10, a + neighbours + 1); ++b) out.bonds.emplace_back(a, b);
+    }
     return out;
   }
 
   [[nodiscard]] PairPose pose(const std::pair<int, int>& bond) const {
     const Vec3& a = position[static_cast<std::size_t>(bond.first)];
     const Vec3& b = position[static_cast<std::size_t>(bond.second)];
-    return {.r = b - a, .normal_a = a, .normal_b = b};
+    return {.r = b - a, .normal_a = normal[static_cast<std::size_t>(bond.first)], .normal_b = normal[static_cast<std::size_t>(bond.second)]};
   }
 
   /// Number of zero eigenvalues of the sum of `add(pose)` over the bonds, on the degrees of freedom `free` of each
@@ -199,14 +214,14 @@ TEST(ZeroModes, FormLeavesSlidingAndTwistFree) {
   const auto form = [](const PairPose& pose) {
     return hessian(FormRadius{.strength = 1.0, .radius = 1.0, .weight = {}}, pose, HessianKind::Exact);
   };
-  ASSERT_EQ(Closed::icosahedron().bonds.size(), 30U);
-  EXPECT_EQ(Closed::ring(8).zero_modes(kInPlane, form), 10);
-  EXPECT_EQ(Closed::icosahedron().zero_modes(kInSpace, form), 39);
+  ASSERT_EQ(Structure::icosahedron().bonds.size(), 30U);
+  EXPECT_EQ(Structure::ring(8).zero_modes(kInPlane, form), 10);
+  EXPECT_EQ(Structure::icosahedron().zero_modes(kInSpace, form), 39);
 }
 
 TEST(ZeroModes, CohesionAddsNoStiffnessAtRest) {
-  EXPECT_EQ(Closed::ring(8).zero_modes(kInPlane, form_and_cohesion), 10);
-  EXPECT_EQ(Closed::icosahedron().zero_modes(kInSpace, form_and_cohesion), 39);
+  EXPECT_EQ(Structure::ring(8).zero_modes(kInPlane, form_and_cohesion), 10);
+  EXPECT_EQ(Structure::icosahedron().zero_modes(kInSpace, form_and_cohesion), 39);
 }
 
 TEST(ZeroModes, HarmonicDistancesLeaveTheSpinsOfASphereFree) {
@@ -215,16 +230,28 @@ TEST(ZeroModes, HarmonicDistancesLeaveTheSpinsOfASphereFree) {
     return hessian(FormRadius{.strength = 1.0, .radius = 1.0, .weight = {}}, pose, HessianKind::Exact) +
            hessian(law, pose, HessianKind::Exact);
   };
-  EXPECT_EQ(Closed::ring(8).zero_modes(kInPlane, form_and_harmonic), 3);
-  EXPECT_EQ(Closed::icosahedron().zero_modes(kInSpace, form_and_harmonic), 18);
+  EXPECT_EQ(Structure::ring(8).zero_modes(kInPlane, form_and_harmonic), 3);
+  EXPECT_EQ(Structure::icosahedron().zero_modes(kInSpace, form_and_harmonic), 18);
+}
+
+TEST(ZeroModes, OfAPlaneSpiralAreSpinsAloneFromSecondNeighboursOn) {
+  const auto laws = [](const PairPose& pose) -> PairHessian {
+    const LennardJones law = LennardJones::from_gain(pose.r.norm(), 1.0, 4);
+    return hessian(Form{.strength = 1.0, .curvature = 0.0, .weight = {}}, pose, HessianKind::Exact) +
+           hessian(Coplanarity{.strength = 1.0, .weight = {}}, pose, HessianKind::Exact) + hessian(law, pose, HessianKind::Exact);
+  };
+  constexpr int kRigid = 6, kSpins = 10;  // of each particle about its normal
+  // Shapes in the plane have 2 x 10 - 3 degrees of freedom, and the chain has nine distances.
+  EXPECT_EQ(Structure::spiral(1).zero_modes(kInSpace, laws), kRigid + kSpins + 8);
+  for (int neighbours = 2; neighbours < 10; ++neighbours) EXPECT_EQ(Structure::spiral(neighbours).zero_modes(kInSpace, laws), kRigid + kSpins) << neighbours;
 }
 
 TEST(ZeroModes, BondFramesLeaveRigidMotionAlone) {
   const auto bond_frame = [](const PairPose& pose) {
     return hessian(BondFrame::from_rest(1.0, 1.0, pose), pose, HessianKind::Exact);
   };
-  EXPECT_EQ(Closed::ring(8).zero_modes(kInPlane, bond_frame), 3);
-  EXPECT_EQ(Closed::icosahedron().zero_modes(kInSpace, bond_frame), 6);
+  EXPECT_EQ(Structure::ring(8).zero_modes(kInPlane, bond_frame), 3);
+  EXPECT_EQ(Structure::icosahedron().zero_modes(kInSpace, bond_frame), 6);
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "file/expression.h"
+#include "file/expand/expression.h"
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
 #include "support/temp_folder.h"

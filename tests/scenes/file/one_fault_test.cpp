@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "file/fields_info.h"
+#include "file/fields/fields_info.h"
 #include "supple/core/error.h"
 #include "supple/scenes/read_scene.h"
 #include "support/source_dir.h"

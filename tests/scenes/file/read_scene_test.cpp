@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "file/yaml_quantity.h"
+#include "file/yaml/yaml_quantity.h"
 #include "supple/core/error.h"
 #include "support/source_dir.h"
 #include "support/temp_folder.h"

@@ -1,5 +1,5 @@
 /// Which keys saved states and pictures depend on.
-#include "file/scene_keys.h"
+#include "file/fields/scene_keys.h"
 
 #include <gtest/gtest.h>
 

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <thread>
 
-#include "file/scene_keys.h"
+#include "file/fields/scene_keys.h"
 #include "output/files/output_files.h"
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"

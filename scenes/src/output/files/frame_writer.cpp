@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "file/scene_keys.h"
+#include "file/fields/scene_keys.h"
 #include "file/scene_places.h"
 #include "output/files/animation_parts.h"
 #include "output/files/frame_tables.h"

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "file/fields_rules.h"
+#include "file/fields/fields_rules.h"
 #include "output/meshes/search_files.h"
 #include "output/run/spare_memory.h"
 #include "simulation/contact_work.h"

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "file/scene_keys.h"
+#include "file/fields/scene_keys.h"
 #include "file/scene_places.h"
 #include "output/files/output_files.h"
 #include "output/files/saved_frames.h"

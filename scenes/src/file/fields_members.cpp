@@ -1,8 +1,0 @@
-#include "file/fields.h"
-#include "file/fields_archive.h"
-
-namespace supple::scenes {
-
-void scene_members(FieldArchive& archive, Scene& scene) { fields(archive, scene); }
-
-}  // namespace supple::scenes
