@@ -226,22 +226,14 @@ float area_visibility(int i, vec3 p, vec3 n) {
   }
   vec2 reach = max(half_sizes * (sum / max(blockers, 1.0)), 1.2 * texel) / extent.xy;
   int taps = blockers > 0.5 ? 32 : 0;
-  float nearest = kCorner * step * k * k;   // as in sun_visibility
   float lit = 0.0;
-  float known = 0.0;
   for (int j = 0; j < taps; ++j) {
     vec2 offset = (fract(start + float(j) * kPlastic) * 2.0 - 1.0) * reach;
-    float limit = depth + dot(slope, offset) - slack;   // beyond 1 where nothing of the map is
+    float limit = min(depth + dot(slope, offset) - slack, 1.0);
     vec2 there = clamp(place + offset, low, 1.0 - low);
-    bool inside = there == place + offset;
-    float found = inside ? textureLod(area_depth, corner + 0.5 * there, 0.0).r : 1.0;
-    float apart = (limit - found) * extent.z;
-    bool between = apart > nearest && all(lessThan(abs(offset) * extent.xy, half_sizes * apart + 1.5 * texel));
-    float weight = found < min(limit, 1.0) && !between ? kUnknown : 1.0;
-    lit += weight < 1.0 ? 0.0 : (inside ? texture(area_compare, vec3(corner + 0.5 * there, min(limit - nearest / extent.z, 1.0))) : 1.0);
-    known += weight;
+    lit += there == place + offset ? texture(area_compare, vec3(corner + 0.5 * there, limit)) : 1.0;
   }
-  return taps > 0 ? lit / known : 1.0;
+  return taps > 0 ? lit / 32.0 : 1.0;
 }
 )";
 
