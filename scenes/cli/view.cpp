@@ -22,14 +22,26 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kLargestReport = std::size_t{1} << 24;  // [byte]
 
-/// The scene file of a run, by its report. @throws Error{Io}
-std::string scene_of(const fs::path& folder) {
+/// What a run was of, by its report.
+struct RunOf {
+  std::string scene;             ///< its file
+  std::vector<std::string> set;  ///< overrides of its keys
+};
+
+/// @throws Error{Io}
+RunOf run_of(const fs::path& folder) {
   const fs::path path = folder / "result.json";
   const bool there = fs::exists(path);
   const std::vector<std::byte> bytes = there ? io::read_file(path, kLargestReport) : std::vector<std::byte>();
   const char* text = reinterpret_cast<const char*>(bytes.data());
   const nlohmann::json report = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
-  if (report.is_object() && report.contains("scene_file") && report["scene_file"].is_string()) return report["scene_file"];
+  if (report.is_object() && report.contains("scene_file") && report["scene_file"].is_string()) {
+    RunOf out{.scene = report["scene_file"], .set = {}};
+    for (const nlohmann::json& one : report.value("set", nlohmann::json::array())) {
+      if (one.is_string()) out.set.push_back(one);
+    }
+    return out;
+  }
   throw Error(ErrorKind::Io, Fault{.place = path.string(),
                                    .key = {},
                                    .expected = "expected the report of a run with its 'scene_file'",
@@ -42,7 +54,8 @@ std::string scene_of(const fs::path& folder) {
 CLI::App* add_view(CLI::App& app, ViewArguments& a) {
   CLI::App* verb = app.add_subcommand("view", "write a page that plays a run in a browser, or serve it");
   verb->add_option("run", a.run, "run folder, or the scene with --out")->required();
-  verb->add_option("--set", a.set, "override a key, as the run did; may be repeated")->take_all();
+  verb->add_option("--set", a.set, "override a key, as the run did where a scene is named; may be repeated")->take_all();
+  verb->add_option("--allow-path", a.allowed, "file or folder outside the scene's folder that the scene may read; may be repeated")->take_all();
   verb->add_option("--out", a.out, "run folder, where a scene is named (default: out/NAME)");
   verb->add_option("--page", a.page, "file to write (default: NAME_view.html in the run folder)");
   verb->add_option("--frames", a.frames, "frames to show, e.g. 1-50,60,70-90:2 (default: all)");
@@ -60,7 +73,10 @@ CLI::App* add_view(CLI::App& app, ViewArguments& a) {
 
 int view(const ViewArguments& a, const std::atomic<int>& interrupt) {
   const bool is_folder = fs::is_directory(a.run);
-  const scenes::Scene scene = scenes::read_scene(is_folder ? scene_of(a.run) : find_scene(a.run), a.set);
+  RunOf of = is_folder ? run_of(a.run) : RunOf{.scene = find_scene(a.run), .set = {}};
+  of.set.insert(of.set.end(), a.set.begin(), a.set.end());
+  const std::vector<fs::path> allowed(a.allowed.begin(), a.allowed.end());
+  const scenes::Scene scene = scenes::read_scene(of.scene, of.set, allowed);
   const fs::path folder = is_folder ? fs::path(a.run) : a.out.empty() ? fs::path("out") / scenes::scene_name(scene) : fs::path(a.out);
   if (a.serve) {
     ViewServer server(scene, {.folder = folder, .port = a.port, .cells = a.cells > 0 ? a.cells : scenes::kFollowedViewCells, .interrupt = &interrupt});

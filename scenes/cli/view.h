@@ -12,7 +12,7 @@ namespace supple::tool {
 
 struct ViewArguments {
   std::string run;               ///< run folder or scene
-  std::vector<std::string> set;
+  std::vector<std::string> set, allowed;
   std::string out, page, frames;
   std::string progress = "auto";
   int threads = 0, cells = 0, port = 0;

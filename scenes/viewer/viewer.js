@@ -181,7 +181,7 @@
     const colours = new Float32Array(4 * count).fill(1);
     for (let i = 1; i < count; ++i) colours[4 * i + 3] = 0;  // fades out at its rim
     disc.setAttribute("color", new T.BufferAttribute(colours, 4));
-    ground = new T.Mesh(disc, new T.MeshStandardMaterial({ color: srgb(head.ground.colour), roughness: 0.9, vertexColors: true, transparent: true, depthWrite: false }));
+    ground = new T.Mesh(disc, new T.MeshStandardMaterial({ color: srgb(head.ground.colour), roughness: 0.9, vertexColors: true, transparent: true, depthWrite: false, dithering: true }));
     ground.receiveShadow = true;
     ground.renderOrder = -1;
     ground.position.set(middle.x, middle.y, head.ground.height);

@@ -2,6 +2,7 @@
 /// Closed meshes with exact normals for the tests of the pictures.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -49,6 +50,16 @@ inline Mesh rounded_box(const Vec3& core, double radius, int cells, const Pose& 
 
 inline Mesh sphere(const Vec3& centre, double radius, int cells) {
   return rounded_box(Vec3::Zero(), radius, cells, {.position = centre, .orientation = Quat::Identity()});
+}
+
+/// A block between two corners, with sharp edges.
+inline Mesh block_of(const Vec3& low, const Vec3& high) {
+  const auto corner = [&](int k) { return Vec3((k & 1) != 0 ? high.x() : low.x(), (k & 2) != 0 ? high.y() : low.y(), (k & 4) != 0 ? high.z() : low.z()); };
+  Mesh mesh;
+  for (const auto& f : {std::array{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
+    add_quadrangle(mesh, corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]));
+  }
+  return mesh;
 }
 
 }  // namespace supple::render::test

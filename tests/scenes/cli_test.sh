@@ -70,6 +70,13 @@ expect 2 "supple run: expected an option, found '-out'; did you mean '--out'?" r
 expect 2 "supple check: expected an option, found '--camera'; known: --help, --set, --allow-path, --quiet" check good.yaml --camera=left
 expect 2 '--frames' run good.yaml --out frames --frames 5-1 --progress none
 expect 0 '' view good --progress none --cells 12
+# Of a run with other values, and of a preview.
+expect 0 '' run good.yaml --out set --set objects.ball.particles.mass=2 --set gravity=[0,0,-1] --simulate-only --progress none
+expect 0 '' view set --progress none --cells 12
+expect 7 'objects.ball.particles.mass=2 (here 1)' view good.yaml --out set --progress none --cells 12
+expect 0 '' view good.yaml --out set --set objects.ball.particles.mass=2 --set gravity=[0,0,-1] --progress none --cells 12
+expect 0 '' run good.yaml --preview --out previewed --simulate-only --progress none
+expect 0 '' view previewed --progress none --cells 12
 expect 4 "name the scene instead: supple view SCENE --out ." view .
 expect 4 "expected saved states of 'good'" view good.yaml --out nowhere --progress none
 expect 0 '' export good.yaml --out good --gltf --progress none

@@ -28,13 +28,14 @@ namespace supple::render {
   X(FRAMEBUFFERTEXTURE2D, FramebufferTexture2D) X(GENBUFFERS, GenBuffers) X(GENFRAMEBUFFERS, GenFramebuffers) \
   X(GENSAMPLERS, GenSamplers) X(GENTEXTURES, GenTextures) X(GENVERTEXARRAYS, GenVertexArrays)                 \
   X(GENERATEMIPMAP, GenerateMipmap) X(GETERROR, GetError) X(GETINTEGERV, GetIntegerv)                         \
+  X(GETMULTISAMPLEFV, GetMultisamplefv)                                                                       \
   X(GETPROGRAMINFOLOG, GetProgramInfoLog) X(GETPROGRAMIV, GetProgramiv) X(GETSHADERINFOLOG, GetShaderInfoLog) \
   X(GETSHADERIV, GetShaderiv) X(GETSTRING, GetString) X(GETUNIFORMLOCATION, GetUniformLocation)               \
   X(LINKPROGRAM, LinkProgram) X(PIXELSTOREI, PixelStorei) X(POLYGONMODE, PolygonMode)                         \
   X(POLYGONOFFSET, PolygonOffset) X(READBUFFER, ReadBuffer) X(READPIXELS, ReadPixels)                         \
   X(SAMPLEMASKI, SampleMaski) X(SAMPLERPARAMETERI, SamplerParameteri) X(SHADERSOURCE, ShaderSource)           \
   X(TEXIMAGE2D, TexImage2D) X(TEXIMAGE2DMULTISAMPLE, TexImage2DMultisample) X(TEXPARAMETERI, TexParameteri)   \
-  X(UNIFORM1F, Uniform1f) X(UNIFORM1I, Uniform1i) X(UNIFORM2F, Uniform2f) X(UNIFORM3F, Uniform3f)             \
+  X(UNIFORM1F, Uniform1f) X(UNIFORM1I, Uniform1i) X(UNIFORM2F, Uniform2f) X(UNIFORM2FV, Uniform2fv) X(UNIFORM3F, Uniform3f) \
   X(UNIFORM3FV, Uniform3fv) X(UNIFORMMATRIX4FV, UniformMatrix4fv) X(USEPROGRAM, UseProgram)                   \
   X(VERTEXATTRIBPOINTER, VertexAttribPointer) X(VIEWPORT, Viewport)
 
@@ -62,6 +63,9 @@ class Program {
   void set(const char* name, float value) const { gl_->Uniform1f(location(name), value); }
   void set(const char* name, const Eigen::Vector2f& v) const { gl_->Uniform2f(location(name), v.x(), v.y()); }
   void set(const char* name, const Eigen::Vector3f& v) const { gl_->Uniform3f(location(name), v.x(), v.y(), v.z()); }
+  void set(const char* name, std::span<const Eigen::Vector2f> vectors) const {
+    gl_->Uniform2fv(location(name), static_cast<GLsizei>(vectors.size()), vectors.data()->data());
+  }
   void set(const char* name, std::span<const Eigen::Vector3f> vectors) const {
     gl_->Uniform3fv(location(name), static_cast<GLsizei>(vectors.size()), vectors.data()->data());
   }

@@ -104,6 +104,7 @@ void GlRenderer::draw_geometry(const CameraMatrices& camera, std::span<const Ite
 void GlRenderer::set_geometry(const Program& program, const CameraMatrices& camera, const View& view) const {
   program.set("geometry", kGeometry);
   program.set("depths", kDepths);
+  program.set("sample_at", std::span<const Eigen::Vector2f>(sample_at_));
   program.set("half_extent", camera.half_extent);
   program.set("picture_size",
               Eigen::Vector2f(static_cast<float>(settings_.width), static_cast<float>(settings_.height)));

@@ -112,6 +112,7 @@ class GlRenderer final : public Renderer {
   std::unique_ptr<CurrentContext> current_;  // while the members below are made
   Gl gl_;
   int samples_;
+  std::vector<Eigen::Vector2f> sample_at_;  // of the geometry buffer, within a pixel
   std::string description_;
   std::unique_ptr<Programs> programs_;
   std::unique_ptr<Painting> painting_;

@@ -87,6 +87,8 @@ void GlRenderer::make_targets() {
   const int occlusion_size = small ? kSmallGroundOcclusionSize : kGroundOcclusionSize;
   ground_occlusion_ = make_target(gl_, occlusion_size, occlusion_size, {.colour = GL_R32F, .filter = GL_LINEAR});
   geometry_ = make_target(gl_, width, height, {.colour = GL_RG32UI, .depth = true, .samples = samples_});
+  sample_at_.assign(static_cast<std::size_t>(samples_), Eigen::Vector2f::Constant(0.5F));
+  for (std::size_t s = 0; samples_ > 1 && s < sample_at_.size(); ++s) gl_.GetMultisamplefv(GL_SAMPLE_POSITION, static_cast<GLuint>(s), sample_at_[s].data());
   occlusion_ = make_target(gl_, half_width, half_height, {.colour = GL_RG32F});
   blurred_ = make_target(gl_, half_width, half_height, {.colour = GL_RG32F});
   output_ = make_target(gl_, width, height, {.colour = GL_RGBA8, .depth = true});

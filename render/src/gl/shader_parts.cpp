@@ -76,7 +76,7 @@ float wave(float x, float width) {   // +1 and -1 in turn, period 2, averaged ov
 std::string header(int samples) {
   const std::string kind = samples > 1 ? "MS" : "";
   const std::string sample = samples > 1 ? "s" : "0";
-  return std::string(kVersion) + "#define SAMPLES " + std::to_string(samples) + "\nuniform usampler2D" + kind +
+  return std::string(kVersion) + "#define SAMPLES " + std::to_string(samples) + "\nuniform vec2 sample_at[SAMPLES];   // within the pixel\nuniform usampler2D" + kind +
          " geometry;\nuniform sampler2D" + kind + " depths;\n#define GEOMETRY(at, s) texelFetch(geometry, at, " + sample +
          ")\n#define DEPTH(at, s) texelFetch(depths, at, " + sample + ")\n";
 }

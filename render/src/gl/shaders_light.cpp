@@ -15,6 +15,8 @@ uniform mat4 shadow_axes;
 uniform vec3 shadow_extent;
 uniform float shadow_texels;    // 0: no shadows
 uniform float light_tangent;    // tangent of the light's angular radius
+const float kCorner = 6.0;      // texels
+const float kUnknown = 0.15;    // weight
 
 float sun_visibility(vec3 p, vec3 n, bool wanted) {
   vec3 nl = mat3(shadow_axes) * n;
@@ -48,14 +50,23 @@ float sun_visibility(vec3 p, vec3 n, bool wanted) {
   float texels = radius / step;
   bool partly = blockers > 0.5 && blockers < 15.5;
   int taps = partly ? int(clamp(8.0 + 0.8 * texels * texels, 10.0, 56.0)) : 0;
+  // A face that meets this one in a corner lies before its tangent plane, too, and hides nothing of it: what is nearer than some
+  // texels, or beyond the cone of the light, counts little, so that it is dark only where nothing else is known.
   float lit = 0.0;
+  float known = 0.0;
   turned = spin;
   for (int i = 0; i < taps; ++i) {
-    vec2 offset = turned * (radius * sqrt((float(i) + 0.5) / float(taps))) / shadow_extent.xy;
-    lit += texture(shadow_compare, vec3(q.xy + offset, min(q.z + dot(slope, offset) - slack, 1.0)));
+    float shift = radius * sqrt((float(i) + 0.5) / float(taps));
+    vec2 offset = turned * shift / shadow_extent.xy;
+    float limit = q.z + dot(slope, offset) - slack;   // beyond 1 where nothing of the map is
+    float near_by = max(kCorner * step, (shift - 1.5 * step) / max(light_tangent, 1e-3)) / shadow_extent.z;
+    float found = textureLod(shadow_depth, q.xy + offset, 0.0).r;
+    float weight = found < min(limit, 1.0) && limit - found < near_by ? kUnknown : 1.0;
+    lit += weight < 1.0 ? 0.0 : texture(shadow_compare, vec3(q.xy + offset, min(limit - near_by, 1.0)));
+    known += weight;
     turned = kGoldenTurn * turned;
   }
-  return partly ? lit / float(taps) : (blockers < 0.5 ? 1.0 : 0.0);
+  return partly ? lit / known : (blockers < 0.5 ? 1.0 : 0.0);
 }
 )";
 
@@ -334,8 +345,9 @@ vec4 ground_light(vec3 p, vec3 behind, vec3 visible) {
   vec2 at = (ground_to_unit * vec4(p, 1.0)).xy;
   float ao = mix(1.0, textureLod(ground_visibility, clamp(at, 0.0, 1.0), 0.0).r, ground_occluded);
 #ifdef GROUND_PAINT
-  vec3 albedo = ground_colour(p.xy - ground_origin, ground_place(gl_FragCoord.xy + vec2(1.0, 0.0)) - p.xy,
-                              ground_place(gl_FragCoord.xy + vec2(0.0, 1.0)) - p.xy);
+  vec2 here = ground_place(gl_FragCoord.xy);
+  vec3 albedo = ground_colour(p.xy - ground_origin, ground_place(gl_FragCoord.xy + vec2(1.0, 0.0)) - here,
+                              ground_place(gl_FragCoord.xy + vec2(0.0, 1.0)) - here);
 #else
   vec3 albedo = ground_albedo;
 #endif
@@ -545,34 +557,104 @@ void main() {
 })";
 }
 
+namespace {
+
+// Rasterisation rounds the places of vertices. Where a corner of one face ends on an edge of another, this opens a crack of some 1/256 of a
+// pixel, and what shows in it is a hidden face that begins at that edge: a sample of it lies in the plane of the face beside it. Such samples
+// of fixed items become what all others of the pixel are.
+const char* const kCracks = R"(
+const float kBent = 0.9;        // cosine between the normals of different faces
+const float kCrack = 0.0078125;  // pixels, more than two edges that are rounded to 1/256 are apart
+
+bool alike(uint a, vec3 m, uint b, vec3 n) { return (a == b || (a & b & kFixed) != 0u) && dot(m, n) >= kBent; }
+
+bool meets(uint a, vec3 m, vec3 p, uint b, vec3 n, vec3 q, float footprint) {
+  bool fixed_ones = (a & b & kFixed) != 0u && dot(m, n) < kBent;
+  mat3 to_world = transpose(mat3(view));
+  float slant = max(abs(dot(m, normalize(to_world * p))), 0.05);
+  return fixed_ones && abs(dot(to_world * (p - q), n)) * slant < kCrack * footprint * -p.z;
+}
+
+#if SAMPLES > 1
+void close_cracks(inout uint id[SAMPLES], inout vec3 normal[SAMPLES], vec3 place[SAMPLES], float footprint) {
+  int count[SAMPLES];
+  for (int s = 0; s < SAMPLES; ++s) {
+    count[s] = 0;
+    for (int t = 0; t < SAMPLES; ++t) count[s] += alike(id[s], normal[s], id[t], normal[t]) ? 1 : 0;
+  }
+  for (int s = 0; s < SAMPLES; ++s)
+    for (int t = 0; t < SAMPLES; ++t) {   // what has become like others meets nothing more
+      bool hidden = count[t] > count[s] && count[t] + count[s] == SAMPLES && meets(id[s], normal[s], place[s], id[t], normal[t], place[t], footprint);
+      id[s] = hidden ? id[t] : id[s];
+      normal[s] = hidden ? normal[t] : normal[s];
+    }
+}
+#else
+void close_crack(ivec2 pixel, inout uint id, inout vec3 normal, vec3 place, float footprint) {
+  ivec2 last = ivec2(picture_size) - 1;
+  bool alone = true;
+  bool hidden = false;
+  uint found = 0u;
+  vec3 its_normal = vec3(0.0);
+  for (int k = 0; k < 4; ++k) {
+    ivec2 there = clamp(pixel + ivec2(k < 2 ? 2 * k - 1 : 0, k < 2 ? 0 : 2 * k - 5), ivec2(0), last);
+    uvec2 item = GEOMETRY(there, 0).rg;
+    vec3 n = unpack_normal(item.x);
+    vec3 q = eye_ray(vec2(there) + sample_at[0]) * eye_depth(DEPTH(there, 0).r);
+    alone = alone && !alike(id, normal, item.y, n);
+    bool here = meets(id, normal, place, item.y, n, q, footprint);
+    hidden = hidden || here;
+    found = here ? item.y : found;
+    its_normal = here ? n : its_normal;
+  }
+  if (alone && hidden) {
+    id = found;
+    normal = its_normal;
+  }
+}
+#endif
+)";
+
+}  // namespace
+
 // Each surface of a pixel is lit once, whatever number of its samples it covers. Surfaces: one for each item (two for
 // an item that folds over itself within the pixel), the ground, and the background.
 std::string lit_items(const Lighting& lighting) {
   return header(lighting.samples) + choices(lighting) +
          (lighting.painted ? painted_access(lighting.samples) : std::string("#define ALBEDO(at, s) vec3(0.0)\n")) + kDisc + kGeometry +
-         kPixel + kShadow + kGlassShadow + kLight + kMaterial + kShown + lights(lighting) + kGroundLight + kItemLight + R"(
+         kPixel + kShadow + kGlassShadow + kLight + kMaterial + kShown + lights(lighting) + kGroundLight + kItemLight + kCracks + R"(
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec3 ray = eye_ray(gl_FragCoord.xy);
-  vec3 along = transpose(mat3(view)) * ray;
-  float floor_depth = ground_depth(ray);
+  mat3 to_world = transpose(mat3(view));
+  vec3 along = to_world * eye_ray(gl_FragCoord.xy);
   vec3 behind = background_colour();
 
   uint id[SAMPLES];
   vec3 normal[SAMPLES];
+  vec3 place[SAMPLES];   // from the eye
   float depth[SAMPLES];
   bool open[SAMPLES];
   for (int s = 0; s < SAMPLES; ++s) {
     uvec2 item = GEOMETRY(pixel, s).rg;
     float stored_depth = DEPTH(pixel, s).r;
     float item_depth = eye_depth(stored_depth);
+    vec3 ray = eye_ray(vec2(pixel) + sample_at[s]);
+    float floor_depth = ground_depth(ray);
     bool is_item = stored_depth > 0.0 && item_depth <= floor_depth;
     id[s] = is_item ? item.y : 0u;
     normal[s] = is_item ? unpack_normal(item.x) : vec3(0.0, 0.0, 1.0);
     depth[s] = is_item ? item_depth : floor_depth;
+    place[s] = ray * depth[s];
     open[s] = true;
   }
   float footprint = 2.0 * half_extent.y / picture_size.y;   // of the pixel, at depth 1
+  bool several = false;
+  for (int s = 1; s < SAMPLES; ++s) several = several || id[s] != id[0] || dot(normal[s], normal[0]) < kBent;
+#if SAMPLES > 1
+  if (several) close_cracks(id, normal, place, footprint);
+#else
+  close_crack(pixel, id[0], normal[0], place[0], footprint);
+#endif
   vec4 sum = vec4(0.0);
   int left = SAMPLES;
   while (left > 0) {
@@ -582,6 +664,7 @@ void main() {
     vec3 first_normal = vec3(0.0, 0.0, 1.0);
     float slack = 0.0;
     float surface_depth = 0.0;
+    vec3 middle = vec3(0.0);   // of its samples, which lies on the surface, too: the middle of the pixel may be behind another one
     vec3 n = vec3(0.0);
     vec3 own_albedo = vec3(0.0);
     int count = 0;
@@ -597,6 +680,7 @@ void main() {
       bool same = open[s] && id[s] == surface_id && (surface_id == 0u || near_by);
       open[s] = open[s] && !same;
       surface_depth += same ? depth[s] : 0.0;
+      middle += same ? place[s] : vec3(0.0);
       n += same ? normal[s] : vec3(0.0);
       own_albedo += same ? ALBEDO(pixel, s) : vec3(0.0);
       count += same ? 1 : 0;
@@ -607,7 +691,7 @@ void main() {
     n = normalize(n);
     bool is_item = surface_id > 0u;
     bool is_floor = !is_item && surface_depth < depth_range.y * 0.5 * kNowhere;
-    vec3 p = eye + along * surface_depth;
+    vec3 p = eye + to_world * (middle / float(max(count, 1)));
     vec3 visible = sun_visibility(p, n, is_item || is_floor) * passed_by_glass(p, n);
     vec4 lit = background(behind);
     if (is_item) lit = item_light(p, n, surface_depth, surface_id, visible, own_albedo);

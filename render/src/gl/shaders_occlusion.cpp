@@ -69,7 +69,7 @@ void main() {
   ivec2 last = ivec2(picture_size) - 1;
   ivec2 pixel = min(ivec2(gl_FragCoord.xy) * 2, last);
   float stored_depth = DEPTH(pixel, 0).r;
-  vec3 ray = eye_ray(vec2(pixel) + 0.5);
+  vec3 ray = eye_ray(vec2(pixel) + sample_at[0]);
   float depth = eye_depth(stored_depth);
   vec3 n = mat3(view) * unpack_normal(GEOMETRY(pixel, 0).r);
   vec3 p = ray * depth;
@@ -84,7 +84,7 @@ void main() {
   for (int i = 0; i < taps; ++i) {
     vec2 offset = turned * (pixels * sqrt((float(i) + 0.5) / float(kTaps)));
     ivec2 other = clamp(pixel + ivec2(round(offset)), ivec2(0), last);
-    vec3 other_ray = eye_ray(vec2(other) + 0.5);
+    vec3 other_ray = eye_ray(vec2(other) + sample_at[0]);
     vec3 v = other_ray * min(eye_depth(DEPTH(other, 0).r), ground_depth(other_ray)) - p;
     float d2 = dot(v, v);
     float closeness = max(1.0 - d2 / r2, 0.0);

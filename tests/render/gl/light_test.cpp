@@ -359,15 +359,6 @@ TEST(LightInside, TurnsThePictureInABallOfGlassByBothRenderers) {
   }
 }
 
-Mesh block_of(const Vec3& low, const Vec3& high) {
-  const auto corner = [&](int k) { return Vec3((k & 1) != 0 ? high.x() : low.x(), (k & 2) != 0 ? high.y() : low.y(), (k & 4) != 0 ? high.z() : low.z()); };
-  Mesh mesh;
-  for (const auto& f : {std::array{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
-    add_quadrangle(mesh, corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]));
-  }
-  return mesh;
-}
-
 TEST(LightInside, ShadowsOfGlassAreWhatItLetsThroughByBothRenderers) {
   // Sun from above through a plate: two faces of index 1.5 and the colour over its thickness. Beside the plate the light is whole.
   const Mesh plate = block_of(Vec3(-1, -1, 2), Vec3(1, 1, 2.1));

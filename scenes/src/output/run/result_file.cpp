@@ -14,6 +14,7 @@
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/scenes/accuracy.h"
+#include "supple/scenes/read_scene.h"
 
 namespace supple::scenes {
 namespace {
@@ -96,6 +97,7 @@ ordered_json report_of(const Scene& scene, const RunResult& result, const Simula
   json["scene"] = scene_name(scene);
   json["title"] = scene.title;
   json["scene_file"] = std::filesystem::absolute(scene.source).string();
+  if (const SceneSource* source = source_of(scene); source != nullptr && !source->overrides.empty()) json["set"] = source->overrides;
   json["outcome"] = result.outcome;
   json["reason"] = result.reason;
   json["exit_code"] = result.exit_code;
