@@ -234,7 +234,9 @@ def sanitized_fuzz(target, context, asked):
     """A fuzz target by libFuzzer, for so many inputs, but at most an hour; what it finds is left in its folder."""
     outcome = Outcome()
     with BUILDING:
-        for command in (["cmake", "--preset", "fuzz"], ["cmake", "--build", "--preset", "fuzz", "--target", "fuzz_" + target]):
+        # A configured folder keeps its options.
+        configure = [] if (context.sources / "build/fuzz/build.ninja").exists() else [["cmake", "--preset", "fuzz"]]
+        for command in (*configure, ["cmake", "--build", "--preset", "fuzz", "--target", "fuzz_" + target]):
             built = run_process(command, timeout=4 * LONG_S, cwd=context.sources)
             if built.code != 0:
                 raise RuntimeError(f"{' '.join(command)} ended with {built.code}: {(built.err or built.out)[-300:]}")
