@@ -37,10 +37,11 @@ inline const std::filesystem::path& scratch() {
   return folder.path;
 }
 
-/// A file of the scratch folder that stays open from input to input: to create and to close it takes longer than to read it.
+/// A file that stays open from input to input: to create and to close it takes longer than to read it.
 class InputFile {
  public:
-  explicit InputFile(const char* name) : path_(scratch() / name), descriptor_(io::open_file(path_, O_RDWR | O_CREAT | O_TRUNC)) {}
+  /// @param name  of a file in the scratch folder, or its whole path
+  explicit InputFile(const std::filesystem::path& name) : path_(scratch() / name), descriptor_(io::open_file(path_, O_RDWR | O_CREAT | O_TRUNC)) {}
   /// @return its path, with these bytes as its content
   const std::filesystem::path& with(std::span<const std::uint8_t> bytes) {
     const bool written = io::write_all_at(descriptor_.get(), std::as_bytes(bytes), 0) == 0;
