@@ -47,7 +47,7 @@ ROWS = [
     Row("hostile", "hostile scenes and golden messages: refused in 1 s of processor time, the quickest of three, and 256 MB", 250, "scenes", rows_inputs.hostile),
     Row("files", "meshes (OBJ, PLY, OFF, STL) and tables (CSV), mutated", 2_000, "files", functools.partial(rows_inputs.by_libraries, "files")),
     Row("fits", "fits of damaged meshes, scenes with damaged objects, fits whose input, output and memory fail or that are killed: refused with a message, no incomplete file", 400, "trials", rows_fits.fits),
-    Row("fuzz", "fuzz targets (mesh, CSV, PNG, state with a right checksum, scene read, scene checked): corpora with changes; used or refused", 50_000, "inputs", rows_programs.fuzz),
+    Row("fuzz", "fuzz targets (mesh, CSV, PNG, state with a right checksum, scene read, scene checked): corpora with changes; used or refused", 1_000_000, "inputs", rows_programs.fuzz),
     *(Row(f"libfuzzer-{target}", f"fuzz target {target} led by coverage, with address and undefined-behaviour sanitizers in core, render and scenes, by clang", round(share * 10_000_000), "inputs",
           functools.partial(rows_programs.sanitized_fuzz, target), only_named=True) for target, share in rows_programs.FUZZ_TARGETS.items()),
     Row("state-bytes", "saved states with altered bytes, by the library: refused", 10_000, "states", functools.partial(rows_inputs.by_libraries, "states")),
