@@ -170,8 +170,12 @@ function(supple_test module)
   target_compile_options(${module}_tests PRIVATE $<$<CONFIG:Release>:-O1>)
   supple_precompile(${module}_tests supple_test_headers OFF "supple::core;GTest::gtest_main" <gtest/gtest.h> <filesystem> <fstream> <sstream>)
   file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/tests-tmp)  # two builds may test at the same time
+  set(limit 600)  # [s]
+  if(SUPPLE_SANITIZE)
+    set(limit 3600)
+  endif()
   gtest_discover_tests(${module}_tests
-    PROPERTIES LABELS ${module} ENVIRONMENT TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT 600)
+    PROPERTIES LABELS ${module} ENVIRONMENT TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT ${limit})
 endfunction()
 
 # Installs the CMake package, scenes, documents and licence; each library installs itself.

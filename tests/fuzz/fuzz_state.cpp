@@ -9,7 +9,7 @@
 #include "supple/core/hash.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/simulation.h"
-#include "supple/scenes/state.h"
+#include "supple/scenes/state_bytes.h"
 
 namespace {
 
@@ -40,10 +40,8 @@ const Seed& seed() {
     scenes::Simulation simulation(scenes::parse_scene(kScene, "seed.yaml", "."), {.threads = 1});
     simulation.step_frame();
     Seed made{scenes::origin_of(simulation.scene()), {}};
-    const std::filesystem::path path = fuzz::scratch() / "seed.state";
-    scenes::save_state(path, simulation.state(), made.origin);
-    made.content.resize(std::filesystem::file_size(path) - sizeof(std::uint64_t));
-    std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(made.content.data()), static_cast<std::streamsize>(made.content.size()));
+    made.content = scenes::state_bytes(simulation.state(), made.origin);
+    made.content.resize(made.content.size() - sizeof(std::uint64_t));
     return made;
   }();
   return one;
@@ -69,7 +67,5 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::uint64_t check = hash_bytes(state);
   const auto* const bytes = reinterpret_cast<const std::byte*>(&check);
   state.insert(state.end(), bytes, bytes + sizeof check);
-  return fuzz::used_or_refused([&] {
-    (void)scenes::load_state(fuzz::as_file("fuzz.state", {reinterpret_cast<const std::uint8_t*>(state.data()), state.size()}), seed().origin);
-  });
+  return fuzz::used_or_refused([&] { (void)scenes::state_of_bytes("fuzz.state", state, seed().origin); });
 }

@@ -3,18 +3,19 @@
 /// escapes, a crash, or a report of a sanitizer is a fault.
 #pragma once
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 
 #include "supple/core/error.h"
+#include "supple/core/io/descriptor.h"
 
 /// Called by libFuzzer, or by replay.cpp in programs without it.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
@@ -36,14 +37,22 @@ inline const std::filesystem::path& scratch() {
   return folder.path;
 }
 
-/// Writes the bytes to a file of the scratch folder. @return its path
-inline std::filesystem::path as_file(const char* name, std::span<const std::uint8_t> bytes) {
-  std::filesystem::path path = scratch() / name;
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!file.flush()) throw std::runtime_error("cannot write " + path.string());
-  return path;
-}
+/// A file that stays open from input to input: to create and to close it takes longer than to read it.
+class InputFile {
+ public:
+  /// @param name  of a file in the scratch folder, or its whole path
+  explicit InputFile(const std::filesystem::path& name) : path_(scratch() / name), descriptor_(io::open_file(path_, O_RDWR | O_CREAT | O_TRUNC)) {}
+  /// @return its path, with these bytes as its content
+  const std::filesystem::path& with(std::span<const std::uint8_t> bytes) {
+    const bool written = io::write_all_at(descriptor_.get(), std::as_bytes(bytes), 0) == 0;
+    if (!written || ::ftruncate(descriptor_.get(), static_cast<off_t>(bytes.size())) != 0) throw std::runtime_error("cannot write " + path_.string());
+    return path_;
+  }
+
+ private:
+  std::filesystem::path path_;
+  io::Descriptor descriptor_;
+};
 
 /// Calls `use`. @throws whatever is no refusal
 template <class Use>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <iterator>
 #include <random>
 #include <string_view>
@@ -44,7 +45,8 @@ Bytes changed(Bytes bytes, std::mt19937_64& random) {
 constexpr const char* kKept = "fuzz_input";
 
 void run(const Bytes& bytes) {
-  std::ofstream(kKept, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  static supple::fuzz::InputFile kept(std::filesystem::current_path() / kKept);
+  kept.with(bytes);
   LLVMFuzzerTestOneInput(bytes.data(), bytes.size());
 }
 

@@ -208,7 +208,8 @@ def invariance(context, asked):
     return outcome
 
 
-FUZZ_TARGETS = {"mesh": 1.0, "csv": 1.0, "png": 1.0, "state": 1.0, "scene": 0.01}  # share of the inputs, as some take far longer
+FUZZ_TARGETS = {"mesh": 1.0, "csv": 1.0, "png": 1.0, "state": 1.0, "scene": 1.0, "check": 0.01}  # share of the inputs, as some take far longer
+SCENES = "tests/golden/messages"  # more to begin with for targets that read scenes
 
 
 def fuzz(context, asked):
@@ -233,14 +234,17 @@ def sanitized_fuzz(target, context, asked):
     """A fuzz target by libFuzzer, for so many inputs, but at most an hour; what it finds is left in its folder."""
     outcome = Outcome()
     with BUILDING:
-        for command in (["cmake", "--preset", "fuzz"], ["cmake", "--build", "--preset", "fuzz", "--target", "fuzz_" + target]):
+        # A configured folder keeps its options.
+        configure = [] if (context.sources / "build/fuzz/build.ninja").exists() else [["cmake", "--preset", "fuzz"]]
+        for command in (*configure, ["cmake", "--build", "--preset", "fuzz", "--target", "fuzz_" + target]):
             built = run_process(command, timeout=4 * LONG_S, cwd=context.sources)
             if built.code != 0:
                 raise RuntimeError(f"{' '.join(command)} ended with {built.code}: {(built.err or built.out)[-300:]}")
     folder = context.folder("libfuzzer_" + target)
     (folder / "found").mkdir()
-    ended = run_process([context.sources / "build/fuzz/bin" / ("fuzz_" + target), f"-runs={asked}", f"-max_total_time={LONG_S}", f"-seed={context.seed}", "-timeout=120",
-                         "-rss_limit_mb=4096", "-print_final_stats=1", "found", context.sources / "tests/fuzz/corpus" / target], timeout=2 * LONG_S, cwd=folder)
+    corpora = [context.sources / "tests/fuzz/corpus" / target, *([context.sources / SCENES] if target in ("scene", "check") else [])]
+    ended = run_process([context.sources / "build/fuzz/bin" / ("fuzz_" + target), f"-runs={asked}", f"-max_total_time={LONG_S}", f"-seed={context.seed}", "found", *corpora],
+                        timeout=2 * LONG_S, cwd=folder)
     tried = re.search(r"^stat::number_of_executed_units: (\d+)", ended.err, re.MULTILINE)
     outcome.reached = int(tried.group(1)) if tried else 0
     kept = len(list((folder / "found").iterdir()))
