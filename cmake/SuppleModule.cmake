@@ -61,7 +61,7 @@ set(supple_common_headers
   <string> <string_view> <tuple> <utility> <vector> <Eigen/Core> <Eigen/Geometry>)
 
 # supple_precompile(TARGET OWNER PIC LIBRARIES headers...): uses the precompiled headers of OWNER, a target that is made for the first TARGET.
-# OWNER has the compile options of TARGET and defines no macros: GCC accepts precompiled headers for files with more macros, not with fewer.
+# OWNER has the compile options of TARGET, of which GCC takes the level of optimisation from the headers, and defines no macros: GCC accepts precompiled headers for files with more macros, not with fewer.
 function(supple_precompile target owner pic libraries)
   if(NOT SUPPLE_PRECOMPILE_HEADERS)
     return()
