@@ -4,9 +4,9 @@
 #     --quick      small sizes, a few minutes, to see that everything works; the page is build/evidence/evidence.md
 #     --build DIR  a finished build (default: build/release); its tool and benchmarks are brought up to date
 #     --page FILE  the page; plots go to the folder images beside it (default: docs/evidence.md; with PARTs build/evidence/evidence.md)
-#     PART         only these: integrators contact queries meshes pictures scenes skips stability particles bodies conservation mujoco
+#     PART         only these: integrators contact queries meshes pictures scenes skips stability particles bodies conservation peers
 # A part that fails or exceeds its time is a line of the page, and the exit code is 1. The page appears when it is complete.
-# SUPPLE_PEERS is a folder for a virtual environment with MuJoCo (default: build/peers); without it or the package index that part says so.
+# SUPPLE_PEERS is a folder for a virtual environment with MuJoCo and Drake (default: build/peers); without it or the package index that part says so.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build=$root/build/release
@@ -22,6 +22,8 @@ done
 cmake --build "$build" --target supple_tool benchmarks >/dev/null
 peers=${SUPPLE_PEERS:-$root/build/peers}
 if [[ ! -x $peers/bin/python ]]; then python3 -m venv "$peers" || true; fi
-"$peers/bin/python" -c 'import mujoco' 2>/dev/null || timeout 300 "$peers/bin/pip" install --quiet --disable-pip-version-check mujoco || true
+for package in mujoco drake; do
+  "$peers/bin/python" -c "import ${package/drake/pydrake}" 2>/dev/null || timeout 300 "$peers/bin/pip" install --quiet --disable-pip-version-check "$package" || true
+done
 export PYTHONDONTWRITEBYTECODE=1
 PYTHONPATH=$root/scripts exec python3 -m evidence --supple "$build/bin/supple" --peers "$peers/bin/python" "${words[@]}"

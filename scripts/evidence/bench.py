@@ -20,7 +20,7 @@ class Bench:
         self.faults, self.losses, self.plots, self.commands = {}, [], [], []
         self.part, self.end = "", 0.0
         self.numbers = itertools.count(1)
-        self.jelly = []  # rows of this scene, once it was measured
+        self.scenes = {}  # rows by scene, once they are measured
         self.load = os.getloadavg()[0]
         self.date, self.program = time.strftime("%Y-%m-%d"), self.revision()
         shutil.rmtree(work, ignore_errors=True)

@@ -112,7 +112,7 @@ def scenes(b):
             except Failed as fault:
                 b.fault(str(fault))
     found = rows_of(text)
-    b.jelly = found.get("jelly", [])
+    b.scenes = found
     if found:
         b.draw("scenes", draw_accuracy(found))
     cells = []
@@ -210,35 +210,68 @@ def conservation(b):
     return b.command_lines() + ["Ten balls collide inside a free elastic ring without loss, steps of 0.25 ms. The largest values of all steps, relative:", ""] + text
 
 
-def mujoco(b):
+# Modules of Python and what they are called; their programs print rows of the jelly on stairs. The piles of both are one program.
+PEERS = {"mujoco": ("MuJoCo", "jelly_mujoco.py", "4e-3,2e-3,1e-3,5e-4"), "pydrake": ("Drake", "jelly_drake.py", "4e-3,2e-3,1e-3")}
+
+
+def peers(b):
+    here = [module for module in PEERS if installed(b, module)]
+    lines = [f"Left out: {PEERS[module][0]} did not install here." for module in PEERS if module not in here]
+    if not here:
+        return lines
+    jelly = [row for module in here for row in peer_rows(b, PEERS[module][1], "--seconds", "0.6" if b.quick else "2", "--steps", "2e-3,1e-3" if b.quick else PEERS[module][2])]
+    scenes = {"jelly": jelly}
+    if len(here) == len(PEERS) and not b.quick:
+        scenes["pile_rests"] = peer_rows(b, "pile_peers.py", b.supple, "--steps", "4e-3,2e-3,1e-3,5e-4")
+    cells = []
+    for scene, theirs in scenes.items():
+        ours = [] if b.quick else b.scenes.get(scene) or b.rows(f"scenes/{scene}", "--accuracy", "1e-2")
+        series = {}
+        for row in [*theirs, *({"program": "supple", "finite": True, **row} for row in ours)]:
+            if row["finite"]:
+                series.setdefault(row["program"], []).append((row["largest_error"], row["cpu_s_per_s"]))
+        b.draw(f"peers_{scene}", plots.log_log({name: curve for name, curve in series.items() if all(error > 0 for error, _ in curve)},
+                                               "largest error of positions before chaos, of the size of the body", "CPU s per simulated s"))
+        cells += [[f"`{scene}`", row["program"], f'{1e3 * row["step_s"]:.3g} ms', f'{row["cpu_s_per_s"]:.2g}', f'{row["largest_error"]:.1e}', f'{row["compared_s"]:.2g}'] for row in theirs]
+        cells += [[f"`{scene}`", "supple", f'accuracy {row["accuracy"]:g}', f'{row["cpu_s_per_s"]:.2g}', f'{row["largest_error"]:.1e}', f'{row["compared_s"]:.2g}'] for row in ours]
+        say_slower(b, scene, theirs, ours)
+    return b.command_lines() + [b.image(f"peers_{scene}", f"CPU time over the error of `{scene}`") for scene in scenes] + [
+        "", "`jelly`: a cube of 4 x 4 x 4 particles falls down stairs for 2 s, with the same geometry, mass, friction and Young's modulus (that of the bonds, in closed form). MuJoCo collides nodes as balls of 0.024 m, "
+        "Drake the faces of tetrahedra between the nodes, supple the smooth surface. `pile_rests`: a hundred balls, rigid with a soft contact in both other programs. Each program is compared with itself at 16 times "
+        "finer steps, up to the first frame that chaos reaches.", "", *lines, ""] + table(["scene", "program", "step", "CPU s per s", "largest error", "compared [s]"], cells)
+
+
+def installed(b, module):
     try:
-        version = b.call([b.peers, "-c", "import mujoco; print(mujoco.__version__)"], "python -c 'import mujoco'").strip()
+        b.call([b.peers, "-c", f"import {module}"], f"python -c 'import {module}'")
     except (Failed, OSError):
-        return ["Left out: MuJoCo did not install here."]
-    b.commands.clear()
-    script = b.root / "tests/benchmarks/peers/jelly_mujoco.py"
-    options = ["--seconds", "0.6", "--steps", "2e-3,1e-3"] if b.quick else ["--steps", "4e-3,2e-3,1e-3,5e-4"]
-    theirs = [json.loads(line) for line in b.call([b.peers, script, *options], f"python tests/benchmarks/peers/jelly_mujoco.py {' '.join(options)}").splitlines()]
-    ours = [] if b.quick else b.jelly or b.rows("scenes/jelly", "--accuracy", "1e-2")
-    series = {f"MuJoCo {version}": [(row["largest_error"], row["cpu_s_per_s"]) for row in theirs if row["finite"] and row["largest_error"] > 0]}
-    if ours:
-        series["supple"] = [(row["largest_error"], row["cpu_s_per_s"]) for row in ours]
-    b.draw("jelly", plots.log_log(series, "largest error of positions before chaos, of the size of the body", "CPU s per simulated s"))
-    cells = [["MuJoCo " + version, f'{1e3 * row["step_s"]:.3g} ms', f'{row["cpu_s_per_s"]:.2g}', f'{row["largest_error"]:.1e}', f'{row["compared_s"]:.2g}'] for row in theirs]
-    cells += [["supple", f'accuracy {row["accuracy"]:g}', f'{row["cpu_s_per_s"]:.2g}', f'{row["largest_error"]:.1e}', f'{row["compared_s"]:.2g}'] for row in ours]
-    fits = [row["cpu_s_per_s"] for row in theirs if row["finite"] and row["largest_error"] <= 1e-2]
-    if ours and fits and min(fits) < ours[-1]["cpu_s_per_s"]:
-        b.loss(f'The jelly takes {ours[-1]["cpu_s_per_s"] / min(fits):.1f} times the CPU time of MuJoCo at an error of at most 1e-2. Contact is {100 * ours[-1]["contact_share"]:.0f} % of it; the rest is '
-               f'Newton\'s method on bonds with six unknowns a particle, in {ours[-1]["steps"] / (24 * ours[-1]["of_s"]):.0f} steps a frame that friction asks for. Nodes of MuJoCo have three unknowns.')
-    return b.command_lines() + [b.image("jelly", "CPU time over the error of the jelly on stairs"), "",
-                                "A cube of 4 x 4 x 4 particles falls down stairs for 2 s: same geometry, mass, friction and Young's modulus (that of the bonds, in closed form). MuJoCo collides nodes as balls of "
-                                "0.024 m, supple the smooth surface. Each program is compared with itself at 16 times finer steps, up to the first frame that chaos reaches.", ""] + table(
-        ["program", "step", "CPU s per s", "largest error", "compared [s]"], cells)
+        return False
+    finally:
+        b.commands.pop()
+    return True
+
+
+def peer_rows(b, script, *options):
+    shown = ["supple" if word == b.supple else str(word) for word in options]
+    text = b.call([b.peers, b.root / "tests/benchmarks/peers" / script, *options], f"python tests/benchmarks/peers/{script} {' '.join(shown)}")
+    return [{"finite": True, **json.loads(line)} for line in text.splitlines() if line.startswith("{")]
+
+
+def say_slower(b, scene, theirs, ours):
+    fits = [row for row in theirs if row["finite"] and row["largest_error"] <= 1e-2]
+    if not ours or not fits:
+        return
+    best = min(fits, key=lambda row: row["cpu_s_per_s"])
+    if best["cpu_s_per_s"] >= ours[0]["cpu_s_per_s"]:
+        return
+    steps = ours[0]["steps"] / (24 * ours[0]["of_s"])
+    b.loss(f'`{scene}` takes {ours[0]["cpu_s_per_s"] / best["cpu_s_per_s"]:.1f} times the CPU time of {best["program"]} at an error of at most 1e-2. Contact is {100 * ours[0]["contact_share"]:.0f} % of it, in {steps:.0f} steps a frame. '
+           "The particles of supple have six unknowns each, nodes of MuJoCo and Drake three.")
 
 
 KNOWN_LOSSES = (
-    "Other programs were measured once, by hand: [accuracy and speed](accuracy_and_speed.md) has the tables of LAMMPS, VTK, OpenVDB, Drake, Mitsuba and Cycles with their commands. LAMMPS is faster in a melt (1 to 0.9) "
-    "where it does not check its neighbour lists. Drake's deformable bodies are not measured.",
+    "Other programs were measured once, by hand: [accuracy and speed](accuracy_and_speed.md) has the tables of LAMMPS, VTK, OpenVDB, contacts of Drake, Mitsuba and Cycles with their commands. LAMMPS is faster in a melt (1 to 0.9) "
+    "where it does not check its neighbour lists.",
     "An implicit step costs about ten explicit ones where bodies touch, as contact, friction and bonds are solved together by Newton's method. It pays where friction or damping acts.",
 )
 
@@ -254,5 +287,5 @@ ALL = (
     Part("particles", "Scaling with particles", 300.0, particles),
     Part("bodies", "Scaling with bodies", 420.0, bodies),
     Part("conservation", "Conservation", 120.0, conservation),
-    Part("mujoco", "Jelly beside MuJoCo", 420.0, mujoco),
+    Part("peers", "Scenes beside MuJoCo and Drake", 900.0, peers),
 )

@@ -54,7 +54,7 @@ class Page(unittest.TestCase):
         return ended.returncode, page.read_text() if page.exists() else None
 
     def test_failed_parts_are_lines_and_the_exit_code(self):
-        code, page = self.run_parts("integrators", "mujoco")
+        code, page = self.run_parts("integrators", "peers")
         self.assertEqual(code, 1)
         self.assertIn("| Time integration | failed: supple bench core/integrators", page)
         self.assertIn("ended with 3", page)

@@ -41,14 +41,13 @@ bool leaves_plane(const PinMotionDesc& d) {
 
 }  // namespace
 
-void add_led_pin(const Scene& scene, const PinDesc& d, const std::string& key, std::uint32_t particle, std::uint8_t pins, Model& model, ModelFaults& faults) {
+void add_led_pin(const Scene& scene, const PinDesc& d, const std::string& key, core::LedPin pin, Model& model, ModelFaults& faults) {
   const PinMotionDesc& motion = *d.motion;
   if (scene.planar && leaves_plane(motion)) {
     faults.add(key + ".motion", "expected a motion in the plane of a planar scene", "one that leaves it", "");
     return;
   }
-  const Pose start{model.initial.position[particle], model.initial.orientation[particle]};
-  core::LedPin pin{.particle = particle, .pins = pins, .place = {}};
+  const Pose start{model.initial.position[pin.particle], model.initial.orientation[pin.particle]};
   if (!motion.keys.empty()) {
     SolidMotion way = keyed(motion);
     model.solid_speed = std::max(model.solid_speed, largest_speed(way, 0.0));

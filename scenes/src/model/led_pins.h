@@ -11,8 +11,8 @@
 namespace supple::scenes {
 
 /// Adds the motion of a pin to the model, with its speed and the distances that it reaches.
-/// @param key  of the pin  @param pins  what it holds
-void add_led_pin(const Scene& scene, const PinDesc& d, const std::string& key, std::uint32_t particle, std::uint8_t pins, Model& model, ModelFaults& faults);
+/// @param key  of the pin  @param pin  without its place
+void add_led_pin(const Scene& scene, const PinDesc& d, const std::string& key, core::LedPin pin, Model& model, ModelFaults& faults);
 
 /// Sorts the moving pins by particle; a fault where two lead one.
 void sort_led_pins(const Scene& scene, Model& model, ModelFaults& faults);

@@ -244,7 +244,7 @@ void add_pins_and_loads(const Scene& scene, const ObjectDesc& d, const std::stri
     } else {
       model.particles.pinned[object.first + *index] |= pins;
     }
-    if (d.pins[k].motion) add_led_pin(scene, d.pins[k], key + ".pins[" + std::to_string(k) + ']', object.first + *index, pins, model, faults);
+    if (d.pins[k].motion) add_led_pin(scene, d.pins[k], key + ".pins[" + std::to_string(k) + ']', {.particle = object.first + *index, .pins = pins, .place = {}}, model, faults);
   }
   for (std::size_t k = 0; k < d.loads.size(); ++k) {
     const LoadDesc& load = d.loads[k];
