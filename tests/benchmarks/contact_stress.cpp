@@ -111,7 +111,7 @@ int supple::benchmarks::programs::contact_stress(int argc, char** argv) {
     blocks.push_back({std::move(name), columns, all_of(runs)});
     print(blocks.back());
   };
-  std::printf("| what | runs | valid | held | overloaded, told | gains energy | passes untold | stops | energy error of the held |\n"
+  std::printf("| what | runs | valid | held | overloaded, reported | gains energy | passes without a warning | stops | energy error of the held |\n"
               "|---|---|---|---|---|---|---|---|---|\n");
   std::vector<std::function<Result()>> meetings, stacks, squeezes, shots, cores;
   for (const double E : kModulus) {

@@ -313,6 +313,29 @@ TEST(HeldVolume, BooksItsWorkAgainstWhatPresses) {
 }
 
 // It jumps off the ground by what it grew.
+// A body of one particle is not rigid while its kernels change: its samples follow its surface.
+TEST(HeldVolume, MovesTheSamplesOfALoneParticle) {
+  Simulation simulation(parse_scene(R"(schema: 1
+duration: 1
+objects:
+  - name: grows
+    particles: {arrange: single, at: [0, 0, 0.1]}
+    skeleton:
+      - {shape: point, at: [-0.1, 0, 0], kernel: {type: wyvill, radius: 0.3}}
+      - {shape: point, at: [0.1, 0, 0], kernel: {type: wyvill, radius: 0.3}}
+    volume: {rate: 15, target: 0.04}
+    contact: {modulus: 1e3}
+    pins: [{particle: 0}]
+obstacles: [{name: floor, shape: plane}]
+)", "test.yaml", "."));
+  const auto farthest = [&] { return *std::max_element(simulation.state().samples[0].distance.begin(), simulation.state().samples[0].distance.end()); };
+  simulation.step_frame();
+  const double before = farthest();
+  ASSERT_GT(before, 0.0);
+  while (simulation.frame() < 24) simulation.step_frame();
+  EXPECT_GT(farthest(), 1.1 * before);
+}
+
 TEST(HeldVolume, KeepsTheBalanceOfEnergyWhileItPushesItselfUp) {
   Simulation simulation(parse_scene(growing(""), "test.yaml", "."));
   run(simulation, 51);
