@@ -27,14 +27,8 @@ endif()
 if(SUPPLE_WARNINGS_AS_ERRORS AND NOT SUPPLE_SANITIZE)  # what sanitizers add leads GCC to false alarms
   target_compile_options(supple_flags INTERFACE -Werror)
 endif()
-# These checks take half of the compiler's time, of GCC more; the address sanitizer finds the faults of the first two, and
-# scripts/check_all.sh sanitizers runs all of them with clang.
-if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  set(supple_quick_sanitizers ON)
-else()
-  set(supple_quick_sanitizers OFF)
-endif()
-option(SUPPLE_QUICK_SANITIZERS "Sanitizers without the checks of null pointers, sizes of objects and alignment" ${supple_quick_sanitizers})
+# These checks take half of the compiler's time; the address sanitizer finds the faults of the first two.
+option(SUPPLE_QUICK_SANITIZERS "Sanitizers without the checks of null pointers, sizes of objects and alignment" OFF)
 if(SUPPLE_SANITIZE)
   list(JOIN SUPPLE_SANITIZE "," supple_sanitizers)
   # Reports need line numbers only; full debug information takes a quarter of the build.
@@ -47,11 +41,8 @@ if(SUPPLE_SANITIZE)
     endif()
   endif()
 endif()
-# Coverage for the fuzz targets (tests/fuzz) to be led by.
+set(supple_fuzzed core render scenes)  # the modules that read files: their coverage leads the fuzz targets
 option(SUPPLE_FUZZ "Build the fuzz targets as programs of libFuzzer; clang only" OFF)
-if(SUPPLE_FUZZ)
-  target_compile_options(supple_flags INTERFACE -fsanitize=fuzzer-no-link)
-endif()
 
 # Precompiled headers: common includes are read once for all files with the same options, which saves a quarter to a third of the
 # compiler's time.
@@ -112,30 +103,11 @@ function(supple_together)
   endforeach()
 endfunction()
 
-# Modules that are taken from another build instead of being compiled: what a fuzz target calls beyond the code that reads its input.
-set(SUPPLE_BUILT_MODULES "" CACHE STRING "Modules to take from the build SUPPLE_BUILT_IN, which has static libraries of the same source")
-set(SUPPLE_BUILT_IN "" CACHE PATH "A build folder")
-# supple_built(NAME SOURCES LIBRARIES): the library of a module as the other build has it, and what stands for its sources here.
-function(supple_built name sources libraries)
-  set(file ${SUPPLE_BUILT_IN}/${name}/libsupple_${name}.a)
-  if(NOT EXISTS ${file})
-    message(FATAL_ERROR "SUPPLE_BUILT_IN: expected ${file}; build the module there first")
-  endif()
-  add_library(supple_${name}_built STATIC IMPORTED GLOBAL)
-  set_target_properties(supple_${name}_built PROPERTIES IMPORTED_LOCATION ${file} INTERFACE_LINK_LIBRARIES "${libraries}")
-  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}_built.cpp CONTENT "// Nothing: the library is that of another build.\n")
-  set(${sources} ${CMAKE_CURRENT_BINARY_DIR}/${name}_built.cpp PARENT_SCOPE)
-endfunction()
-
 # supple_module(NAME [OWN_OPTIONS] HEADERS h... SOURCES s... [PUBLIC targets] [PRIVATE targets])
 # HEADERS are relative to include/supple/NAME. OWN_OPTIONS: the module has compile options of its own, so it shares no precompiled headers.
 function(supple_module name)
   cmake_parse_arguments(arg "OWN_OPTIONS" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
   set(target supple_${name})
-  if(name IN_LIST SUPPLE_BUILT_MODULES)
-    supple_built(${name} arg_SOURCES "${arg_PUBLIC};${arg_PRIVATE}")
-    list(PREPEND arg_PRIVATE supple_${name}_built)
-  endif()
   add_library(${target} ${arg_SOURCES})
   add_library(supple::${name} ALIAS ${target})
   list(TRANSFORM arg_HEADERS PREPEND "include/supple/${name}/")
@@ -143,6 +115,9 @@ function(supple_module name)
   target_include_directories(${target} PRIVATE src)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:supple_flags>)
+  if(SUPPLE_FUZZ AND name IN_LIST supple_fuzzed)
+    target_compile_options(${target} PRIVATE -fsanitize-coverage=inline-8bit-counters,indirect-calls,trace-cmp,pc-table)  # precompiled headers are shared with modules without it
+  endif()
   if(NOT arg_OWN_OPTIONS)
     supple_precompile(${target} supple_headers ON Eigen3::Eigen)
   endif()
@@ -156,25 +131,42 @@ function(supple_module name)
   install(EXPORT supple_${name}Targets NAMESPACE supple:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supple)
 endfunction()
 
+# Tests whose own code has no sanitizers: their objects are those of another build, which saves the half of a build.
+set(SUPPLE_BUILT_TESTS "" CACHE PATH "A build folder of the same source, compiled for the same ABI, whose test objects are linked with the modules of this one")
+
 # supple_test(MODULE SOURCES s... [LIBRARIES targets]): one test program per module, <module>_tests.
 function(supple_test module)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
-  set(source_dir ${PROJECT_SOURCE_DIR}/tests/support/source_dir.cpp)
-  set_source_files_properties(${source_dir} PROPERTIES
-    COMPILE_DEFINITIONS SUPPLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SKIP_PRECOMPILE_HEADERS ON)
-  add_executable(${module}_tests ${arg_SOURCES} ${source_dir} ${PROJECT_SOURCE_DIR}/tests/support/temp_folder.cpp)
-  set_target_properties(${module}_tests PROPERTIES UNITY_BUILD ${SUPPLE_UNITY_BUILD} UNITY_BUILD_MODE GROUP)
-  target_include_directories(${module}_tests PRIVATE ${PROJECT_SOURCE_DIR}/tests)
-  target_link_libraries(${module}_tests PRIVATE supple::${module} ${arg_LIBRARIES} supple_flags GTest::gtest_main)
-  # Tests take two thirds of the compiler's time with -O1, and about as long when they run: what they call is optimised.
-  target_compile_options(${module}_tests PRIVATE $<$<CONFIG:Release>:-O1>)
-  supple_precompile(${module}_tests supple_test_headers OFF "supple::core;GTest::gtest_main" <gtest/gtest.h> <filesystem> <fstream> <sstream>)
+  set(target ${module}_tests)
+  set(list ${module}_objects.txt)
+  if(SUPPLE_BUILT_TESTS)
+    set(built ${SUPPLE_BUILT_TESTS}/tests/${list})
+    if(NOT EXISTS ${built})
+      message(FATAL_ERROR "SUPPLE_BUILT_TESTS: expected ${built}; build the tests there first")
+    endif()
+    file(STRINGS ${built} objects)
+    # Of an inline function that both have, the linker takes the first: that of the module, with sanitizers.
+    add_executable(${target} $<TARGET_OBJECTS:supple_${module}>)
+    target_link_libraries(${target} PRIVATE ${objects})
+  else()
+    set(source_dir ${PROJECT_SOURCE_DIR}/tests/support/source_dir.cpp)
+    set_source_files_properties(${source_dir} PROPERTIES
+      COMPILE_DEFINITIONS SUPPLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SKIP_PRECOMPILE_HEADERS ON)
+    add_executable(${target} ${arg_SOURCES} ${source_dir} ${PROJECT_SOURCE_DIR}/tests/support/temp_folder.cpp)
+    file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/tests/${list} CONTENT "$<JOIN:$<TARGET_OBJECTS:${target}>,\n>\n")
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ${SUPPLE_UNITY_BUILD} UNITY_BUILD_MODE GROUP)
+    target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+    # Tests take two thirds of the compiler's time with -O1, and about as long when they run: what they call is optimised.
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+    supple_precompile(${target} supple_test_headers OFF "supple::core;GTest::gtest_main" <gtest/gtest.h> <filesystem> <fstream> <sstream>)
+  endif()
+  target_link_libraries(${target} PRIVATE supple::${module} ${arg_LIBRARIES} supple_flags GTest::gtest_main)
   file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/tests-tmp)  # two builds may test at the same time
   set(limit 600)  # [s]
   if(SUPPLE_SANITIZE)
     set(limit 3600)
   endif()
-  gtest_discover_tests(${module}_tests
+  gtest_discover_tests(${target}
     PROPERTIES LABELS ${module} ENVIRONMENT TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT ${limit})
 endfunction()
 

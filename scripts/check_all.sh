@@ -36,17 +36,11 @@ analyse() {
     xargs -P "$supple_jobs" -n 2 clang-tidy --quiet -p "$clang_build"
 }
 
-# Modules scenes and render, the tool, fits and the Python package; scripts/test.sh has those of core, implicit and collision, and the fuzz targets.
-test_sanitizers() { cd "$supple_root" && ctest --preset sanitized -j "$supple_jobs" --no-tests=error; }
+# All modules, the tool, fits and the Python package; the test objects are those of the release build.
+test_sanitizers() { cd "$supple_root" && ctest --preset sanitizers_all -j "$supple_jobs" --no-tests=error; }
 build_sanitizers() {
-  # Modules without sanitizers are those of the release build.
-  local target
-  for target in supple_implicit supple_collision; do
-    configure_and_build release "$target" -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_CGAL=ON || return 1
-  done
-  for target in fuzz scenes_tests render_tests fit_tests supple_fit_program supple_python; do
-    configure_and_build fuzz "$target" -DSUPPLE_CGAL=ON -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3 || return 1
-  done
+  configure_and_build release all -DSUPPLE_BUILD_TESTS=ON -DSUPPLE_CGAL=ON -DSUPPLE_UNITY_BUILD=ON -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3 &&
+    configure_and_build sanitizers all -DSUPPLE_CGAL=ON -DSUPPLE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3
 }
 
 test_tsan() {

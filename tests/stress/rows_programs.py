@@ -235,15 +235,15 @@ def sanitized_fuzz(target, context, asked):
     outcome = Outcome()
     with BUILDING:
         # A configured folder keeps its options.
-        configure = [] if (context.sources / "build/fuzz/build.ninja").exists() else [["cmake", "--preset", "fuzz"]]
-        for command in (*configure, ["cmake", "--build", "--preset", "fuzz", "--target", "fuzz_" + target]):
+        configure = [] if (context.sources / "build/sanitizers/build.ninja").exists() else [["cmake", "--preset", "sanitizers"]]
+        for command in (*configure, ["cmake", "--build", "--preset", "sanitizers", "--target", "fuzz_" + target]):
             built = run_process(command, timeout=4 * LONG_S, cwd=context.sources)
             if built.code != 0:
                 raise RuntimeError(f"{' '.join(command)} ended with {built.code}: {(built.err or built.out)[-300:]}")
     folder = context.folder("libfuzzer_" + target)
     (folder / "found").mkdir()
     corpora = [context.sources / "tests/fuzz/corpus" / target, *([context.sources / SCENES] if target in ("scene", "check") else [])]
-    ended = run_process([context.sources / "build/fuzz/bin" / ("fuzz_" + target), f"-runs={asked}", f"-max_total_time={LONG_S}", f"-seed={context.seed}", "found", *corpora],
+    ended = run_process([context.sources / "build/sanitizers/bin" / ("fuzz_" + target), f"-runs={asked}", f"-max_total_time={LONG_S}", f"-seed={context.seed}", "found", *corpora],
                         timeout=2 * LONG_S, cwd=folder)
     tried = re.search(r"^stat::number_of_executed_units: (\d+)", ended.err, re.MULTILINE)
     outcome.reached = int(tried.group(1)) if tried else 0

@@ -48,7 +48,7 @@ ROWS = [
     Row("files", "meshes (OBJ, PLY, OFF, STL) and tables (CSV), mutated", 2_000, "files", functools.partial(rows_inputs.by_libraries, "files")),
     Row("fits", "fits of damaged meshes, scenes with damaged objects, fits whose input, output and memory fail or that are killed: refused with a message, no incomplete file", 400, "trials", rows_fits.fits),
     Row("fuzz", "fuzz targets (mesh, CSV, PNG, state with a right checksum, scene read, scene checked): corpora with changes; used or refused", 1_000_000, "inputs", rows_programs.fuzz),
-    *(Row(f"libfuzzer-{target}", f"fuzz target {target} led by coverage, with address and undefined-behaviour sanitizers in core, render and scenes, by clang", round(share * 10_000_000), "inputs",
+    *(Row(f"libfuzzer-{target}", f"fuzz target {target} led by coverage, with address and undefined-behaviour sanitizers, by clang", round(share * 10_000_000), "inputs",
           functools.partial(rows_programs.sanitized_fuzz, target), only_named=True) for target, share in rows_programs.FUZZ_TARGETS.items()),
     Row("state-bytes", "saved states with altered bytes, by the library: refused", 10_000, "states", functools.partial(rows_inputs.by_libraries, "states")),
     Row("states", "saved states altered or exchanged, by `run --resume`, `render`, `export`: refused with 7, or simulated again to the same bits", 1_000, "commands", rows_runs.states),

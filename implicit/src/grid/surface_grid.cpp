@@ -11,7 +11,6 @@
 
 #include "grid/grid_leaves.h"
 #include "mesh/triangle_crossings.h"
-#include "supple/core/error.h"
 #include "supple/core/hash.h"
 #include "supple/core/io/atomic_file.h"
 #include "supple/implicit/mesh_limits.h"
@@ -66,11 +65,6 @@ class MemoryArchive : public openvdb::io::Archive {
     return std::move(stream).str();
   }
 };
-
-[[noreturn]] void fail(ErrorKind kind, const std::filesystem::path& path, const std::string& expected,
-                       const std::string& found, const std::string& hint) {
-  throw Error(kind, {.place = path.string(), .key = "", .expected = expected, .found = found, .hint = hint});
-}
 
 }  // namespace
 
@@ -284,38 +278,6 @@ void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid*
   std::string bytes;
   Executor(1).run([&] { bytes = MemoryArchive().bytes(pointers); });
   io::write_atomically(path, std::as_bytes(std::span<const char>(bytes)));
-}
-
-SurfaceGrid read_grid(const std::filesystem::path& path, const std::string& name) {
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code)) {
-    fail(ErrorKind::Io, path, "expected a readable .vdb file", code ? code.message() : "none", "");
-  }
-  openvdb::initialize();
-  SurfaceGrid result;
-  Executor(1).run([&] {
-    openvdb::GridBase::Ptr base;
-    std::string names;
-    try {
-      openvdb::io::File file(path.string());
-      file.open(false);
-      for (auto each = file.beginName(); each != file.endName(); ++each) names += (names.empty() ? "" : ", ") + *each;
-      if (file.hasGrid(name)) base = file.readGrid(name);
-    } catch (const std::exception& error) {
-      fail(ErrorKind::Corrupt, path, "expected an OpenVDB file", error.what(), "write it again");
-    }
-    if (!base) fail(ErrorKind::Corrupt, path, "expected a grid '" + name + "'", names.empty() ? "none" : names, "");
-    FloatGrid::Ptr grid = openvdb::gridPtrCast<FloatGrid>(base);
-    if (!grid) fail(ErrorKind::Corrupt, path, "expected a grid of floats named '" + name + "'", base->type(), "");
-    // OpenVDB reads truncated files without an error.
-    if (const auto written = grid->getMetadata<openvdb::StringMetadata>(kHashKey);
-        written && written->value() != to_hex(hash_of(*grid))) {
-      fail(ErrorKind::Corrupt, path, "expected the content that was written (hash " + written->value() + ")",
-           to_hex(hash_of(*grid)), "the file is truncated or changed: write it again");
-    }
-    result.impl_ = std::make_unique<SurfaceGrid::Impl>(std::move(grid));
-  });
-  return result;
 }
 
 }  // namespace supple::implicit

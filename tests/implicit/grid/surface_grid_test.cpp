@@ -19,10 +19,6 @@
 #include "supple/implicit/mesh_routes.h"
 #include "support/temp_folder.h"
 
-// OpenVDB loses one node when the topology of a file ends early: RootNode::readTopology holds it by a plain pointer.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:RootNode*readTopology\n"; }
-
 namespace supple::implicit {
 namespace {
 
@@ -171,10 +167,8 @@ TEST(SurfaceGrid, IsReadByPlainOpenVdbAsWritten) {
   EXPECT_EQ(potential->getGridClass(), openvdb::GRID_UNKNOWN);
   EXPECT_GT(potential->tree().getValue({0, 0, 0}), 0.0F);
 
-  const SurfaceGrid back = read_grid(path, "ball");
-  EXPECT_EQ(back.hash(), grids[0].hash());
-  EXPECT_EQ(back.active_voxels(), grids[0].active_voxels());
-  EXPECT_EQ(back.value(5, 6, 7), grids[0].value(5, 6, 7));
+  EXPECT_EQ(grid->metaValue<std::string>("content_hash"), to_hex(grids[0].hash()));
+  EXPECT_EQ(grid->tree().getValue({5, 6, 7}), grids[0].value(5, 6, 7));
 }
 
 TEST(SurfaceGrid, DoesNotDependOnThreads) {
@@ -705,21 +699,14 @@ TEST(SurfaceGrid, RefusesCellsThatOpenVdbTakesForNone) {
   EXPECT_FALSE(std::isfinite(estimate_routes(skeleton, support, options.lattice.cell).openvdb_ms));
 }
 
-TEST(SurfaceGrid, RefusesFilesThatAreAbsentForeignOrChanged) {
+TEST(SurfaceGrid, LeavesNoTemporaryFileAndNamesTheFileThatCannotBeWritten) {
   const Folder folder;
-  expect_error([&] { (void)read_grid(folder / "none.vdb", "ball"); }, ErrorKind::Io, "none.vdb");
-  std::ofstream(folder / "text.vdb") << "no grid";
-  expect_error([&] { (void)read_grid(folder / "text.vdb", "ball"); }, ErrorKind::Corrupt, "expected an OpenVDB file");
-
   const auto path = folder / "ball.vdb";
   std::vector<SurfaceGrid> grids;
   grids.push_back(make_surface_grid(sphere(kOrigin, 0.6), options_of(GridContent::SignedDistance), Executor(1)));
   write_grids(path, grids);
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path.parent_path()), {}), 2);  // no temporary is left
-  expect_error([&] { (void)read_grid(path, "spiral"); }, ErrorKind::Corrupt, "'spiral', found ball");
-  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
-  expect_error([&] { (void)read_grid(path, "ball"); }, ErrorKind::Corrupt, "ball.vdb");
-  expect_error([&] { write_grids(folder / "text.vdb" / "ball.vdb", grids); }, ErrorKind::Io, "ball.vdb");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path.parent_path()), {}), 1);
+  expect_error([&] { write_grids(path / "ball.vdb", grids); }, ErrorKind::Io, "ball.vdb");
 }
 
 TEST(SurfaceGrid, ThatWasNeverMadeIsACallersMistake) {

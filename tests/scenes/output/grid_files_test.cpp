@@ -7,10 +7,9 @@
 #include <string>
 
 #include "scenes/small_scenes.h"
-#include "supple/core/error.h"
-#include "supple/implicit/surface_grid.h"
 #include "supple/scenes/read_scene.h"
 #include "supple/scenes/run.h"
+#include "support/grid_file.h"
 #include "support/temp_folder.h"
 
 namespace supple::scenes {
@@ -47,25 +46,17 @@ TEST_F(GridFiles, AreObjectsOfTheSceneOrBoth) {
     EXPECT_EQ(run_scene(scene_, again).outcome, "done");
     return folder_ / "grids/drops.0001.vdb";
   };
-  const auto refused = [](const fs::path& file, const std::string& name) {
-    try {
-      (void)implicit::read_grid(file, name);
-      return false;
-    } catch (const Error&) {
-      return true;
-    }
-  };
   const fs::path objects = grids_of(GriddedName::Objects, GridContentName::Distance);
-  EXPECT_LT(implicit::read_grid(objects, "left").interpolate(Vec3(-0.3, 0, 0)), 0.0);
-  EXPECT_GT(implicit::read_grid(objects, "left").interpolate(Vec3(0.3, 0, 0)), 0.0);
-  EXPECT_TRUE(refused(objects, "scene"));
+  EXPECT_LT(GridOfFile(objects, "left").interpolate(Vec3(-0.3, 0, 0)), 0.0);
+  EXPECT_GT(GridOfFile(objects, "left").interpolate(Vec3(0.3, 0, 0)), 0.0);
+  EXPECT_FALSE(GridOfFile(objects, "scene").found());
   const fs::path scene = grids_of(GriddedName::Scene, GridContentName::Distance);
-  EXPECT_TRUE(refused(scene, "left"));
-  EXPECT_LT(implicit::read_grid(scene, "scene").interpolate(Vec3(-0.3, 0, 0)), 0.0);
-  EXPECT_LT(implicit::read_grid(scene, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
+  EXPECT_FALSE(GridOfFile(scene, "left").found());
+  EXPECT_LT(GridOfFile(scene, "scene").interpolate(Vec3(-0.3, 0, 0)), 0.0);
+  EXPECT_LT(GridOfFile(scene, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
   const fs::path both = grids_of(GriddedName::Both, GridContentName::Field);
-  EXPECT_GT(implicit::read_grid(both, "right").interpolate(Vec3(0.3, 0, 0)), 0.0);
-  EXPECT_GT(implicit::read_grid(both, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
+  EXPECT_GT(GridOfFile(both, "right").interpolate(Vec3(0.3, 0, 0)), 0.0);
+  EXPECT_GT(GridOfFile(both, "scene").interpolate(Vec3(0.3, 0, 0)), 0.0);
 }
 
 TEST_F(GridFiles, AreReadByTheToolsOfOpenVdb) {
@@ -115,8 +106,7 @@ TEST_F(GridFiles, OfBodiesThatTouchEndWhereTheyDo) {
   first.frames = {1};
   EXPECT_EQ(run_scene(scene_, first).outcome, "done");
   const fs::path file = folder_ / "grids/drops.0001.vdb";
-  const implicit::SurfaceGrid left = implicit::read_grid(file, "left"), right = implicit::read_grid(file, "right"),
-                              both = implicit::read_grid(file, "scene");
+  const GridOfFile left(file, "left"), right(file, "right"), both(file, "scene");
   // In the plane between equal drops, whose undeformed surfaces lie 0.027 m beyond it, and to its sides.
   for (const double y : {-0.04, 0.0, 0.04}) {
     EXPECT_NEAR(left.interpolate(Vec3(0.0, y, 0.0)), 0.0, 1e-6);
@@ -148,9 +138,9 @@ TEST_F(GridFiles, KeepOnlyWhatIsThatOfAFrameAlone) {
     EXPECT_EQ(run_scene(scene_, alone).outcome, "done");
     const fs::path name = "grids/drops.000" + std::to_string(frame) + ".vdb";
     for (const char* grid : {"left", "right", "far", "scene"}) {
-      EXPECT_EQ(implicit::read_grid(folder_ / name, grid).hash(), implicit::read_grid(alone.folder / name, grid).hash()) << grid << ' ' << frame;
+      EXPECT_EQ(GridOfFile(folder_ / name, grid).content_hash(), GridOfFile(alone.folder / name, grid).content_hash()) << grid << ' ' << frame;
     }
-    touching += implicit::read_grid(folder_ / name, "left").interpolate(Vec3(0.0, 0.0, 0.0)) < 1e-3 ? 1 : 0;
+    touching += GridOfFile(folder_ / name, "left").interpolate(Vec3(0.0, 0.0, 0.0)) < 1e-3 ? 1 : 0;
   }
   EXPECT_GE(touching, 1);
   EXPECT_LE(touching, 4);

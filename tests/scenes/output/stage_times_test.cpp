@@ -64,7 +64,6 @@ obstacles: [{name: floor, shape: plane}]
 }
 
 // A hand that closes spends most of its time on samples and contacts; a stage that is not measured would leave its time to `advance`.
-#ifndef SUPPLE_SANITIZED  // modules with sanitizers take longer than others
 TEST(StageTimes, BelongToTheStagesThatTakeThem) {
   for (const bool every_step : {true, false}) {
     Simulation simulation(library_scene("objects/hand_closes", {"output={}", "duration=0.1 s"}), {.profile = every_step});
@@ -74,7 +73,6 @@ TEST(StageTimes, BelongToTheStagesThatTakeThem) {
     EXPECT_GT(of(Stage::SampleSurface) + of(Stage::FindContacts) + of(Stage::SolveContactSurface), 2.0 * of(Stage::Integrate)) << every_step;
   }
 }
-#endif
 
 }  // namespace
 }  // namespace supple::scenes

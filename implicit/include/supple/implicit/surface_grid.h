@@ -52,7 +52,6 @@ class SurfaceGrid {
   friend SurfaceGrid make_surface_grid(const FieldView&, const GridOptions&, const Executor&);
   friend void write_grids(const std::filesystem::path&, std::span<const SurfaceGrid* const>);
   friend Mesh mesh_of(const SurfaceGrid&, const FieldView&, const Executor&);
-  friend SurfaceGrid read_grid(const std::filesystem::path&, const std::string&);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
@@ -163,7 +162,5 @@ class UnionUpdater {
 /// Writes one .vdb with all grids, by temporary file and rename. @throws Error{Io}
 void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid> grids);
 void write_grids(const std::filesystem::path& path, std::span<const SurfaceGrid* const> grids);
-/// @throws Error{Io} when absent, Error{Corrupt} when not a grid of that name.
-[[nodiscard]] SurfaceGrid read_grid(const std::filesystem::path& path, const std::string& name);
 
 }  // namespace supple::implicit
