@@ -66,8 +66,8 @@ TEST(FitCloud, RefusesWhatIsNoSurface) {
     }
     return std::string("no fault");
   };
-  EXPECT_EQ(message("row.xyz", "0 0 0\n\n1 2\n"), "row.xyz:3: expected three coordinates, or these and a normal, found 1 2");
-  EXPECT_EQ(message("few.xyz", "0 0 0\n1 0 0\n0 1 0\n"), "few.xyz: expected at least 50 different points, found 3");
+  EXPECT_EQ(message("row.xyz", "0 0 0\n\n1 2\n"), "row.xyz:3: expected three coordinates, or these and a normal, found 1 2; remove lines that are no points");
+  EXPECT_EQ(message("few.xyz", "0 0 0\n1 0 0\n0 1 0\n"), "few.xyz: expected at least 50 different points, found 3; sample the surface more densely");
 }
 
 }  // namespace

@@ -32,11 +32,11 @@ std::string off(const std::string& vertices, const std::string& faces) {
 const std::string kTetrahedron = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 
 TEST(FitRefuses, FilesThatAreNoMesh) {
-  EXPECT_EQ(message("mesh.stp", "x"), "mesh.stp: expected a mesh (.ply, .obj, .off, .stl), points (.xyz, .ply) or a volume (.nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vdb), found '.stp'");
+  EXPECT_EQ(message("mesh.stp", "x"), "mesh.stp: expected a mesh (.ply, .obj, .off, .stl), points (.xyz, .ply) or a volume (.nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vdb), found '.stp'; convert the data, or rename a file of another extension");
   EXPECT_EQ(message("wrong_header.off", "OFX 3 1 0\n0 0 0\n"), "wrong_header.off: expected a mesh, found text or bytes that are none, or that end early; the extension says how a file is read");
   EXPECT_EQ(message("cut_off.ply", "ply\nformat ascii 1.0\nelement vertex 3\n"), "cut_off.ply: expected 'end_header', found the end of the file");
-  EXPECT_EQ(message("no_bytes.off", ""), "no_bytes.off: expected data, found an empty file");
-  EXPECT_EQ(message("empty.off", "OFF\n0 0 0\n"), "empty.off: expected triangles, found none");
+  EXPECT_EQ(message("no_bytes.off", ""), "no_bytes.off: expected data, found an empty file; write it again");
+  EXPECT_EQ(message("empty.off", "OFF\n0 0 0\n"), "empty.off: expected triangles, found none; points without faces are read from .xyz and .ply");
   EXPECT_EQ(message("large.off", "OFF\n4000000000 1 0\n0 0 0\n"), "large.off: expected a mesh, found text or bytes that are none, or that end early; the extension says how a file is read");
   try {
     (void)fit(temp_folder() / "wrong_heade.off");

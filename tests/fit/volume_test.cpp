@@ -185,10 +185,10 @@ TEST(FitVolume, ReadsMetaImage) {
   expect_ball(written("packed.mha", kMeta + "CompressedData = True\nElementDataFile = LOCAL\n" + stored(bytes_of(ball()))));
   written("big.raw", "header" + bytes_of(ball(), true));
   expect_ball(written("big.mhd", kMeta + "BinaryDataByteOrderMSB = True\nHeaderSize = -1\nElementDataFile = big.raw\n"));
-  EXPECT_EQ(message(written("header.mha", "NDims = 3\nDimSize 30\n")), "header.mha:2: expected lines of a MetaImage header, Key = Value, up to ElementDataFile, found 'DimSize 30'");
-  EXPECT_EQ(message(written("type.mha", "DimSize = 3 3 3\nElementType = MET_LONG\nElementDataFile = LOCAL\n")), "type.mha: expected an ElementType from MET_CHAR to MET_DOUBLE, found 'MET_LONG'");
-  EXPECT_EQ(message(written("numbers.mha", "DimSize = 3 3\nElementType = MET_SHORT\nElementDataFile = LOCAL\n")), "numbers.mha: expected 3 numbers after DimSize, found '3 3'");
-  EXPECT_EQ(message(written("short.mha", kMeta + "ElementDataFile = LOCAL\nxy")), "short.mha: expected 34320 bytes of voxels, found 2");
+  EXPECT_EQ(message(written("header.mha", "NDims = 3\nDimSize 30\n")), "header.mha:2: expected lines of a MetaImage header, Key = Value, up to ElementDataFile, found 'DimSize 30'; write the header again, its last line is ElementDataFile = FILE or LOCAL");
+  EXPECT_EQ(message(written("type.mha", "DimSize = 3 3 3\nElementType = MET_LONG\nElementDataFile = LOCAL\n")), "type.mha: expected an ElementType from MET_CHAR to MET_DOUBLE, found 'MET_LONG'; convert the voxels to MET_FLOAT");
+  EXPECT_EQ(message(written("numbers.mha", "DimSize = 3 3\nElementType = MET_SHORT\nElementDataFile = LOCAL\n")), "numbers.mha: expected 3 numbers after DimSize, found '3 3'; one for each axis");
+  EXPECT_EQ(message(written("short.mha", kMeta + "ElementDataFile = LOCAL\nxy")), "short.mha: expected 34320 bytes of voxels, found 2; copy the file again, or correct DimSize and ElementType");
   EXPECT_EQ(message(written("large.mha", "DimSize = 1000 1000 1000\nElementType = MET_SHORT\nElementDataFile = LOCAL\n")),
             "large.mha: expected at most 4e+08 voxels, found 1000 x 1000 x 1000; crop the volume, or make it coarser");
   EXPECT_EQ(message(written("flat.mha", "DimSize = 3 3 3\nElementType = MET_UCHAR\nElementSpacing = 1 1 0\nElementDataFile = LOCAL\n")),
@@ -255,7 +255,7 @@ TEST(FitVolume, KeepsTheLargestPieceAndTellsWhereItIsCut) {
 }
 
 TEST(FitVolume, OptionsOfVolumesAreRefusedForMeshes) {
-  EXPECT_EQ(message(test::saved(test::block(Vec3::Ones()), "block")), "block.obj: expected a volume, of which --iso, --window and --label choose a part, found another kind of data");
+  EXPECT_EQ(message(test::saved(test::block(Vec3::Ones()), "block")), "block.obj: expected a volume, of which --iso, --window and --label choose a part, found another kind of data; leave these options out");
   EXPECT_THROW((void)fit(written("w.mha", kMeta), {.volume = {.window = std::array{2.0, 1.0}}}), Error);
 }
 

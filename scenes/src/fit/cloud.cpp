@@ -54,7 +54,7 @@ std::vector<Oriented> read_xyz(const std::filesystem::path& file) {
     std::vector<double> row;
     for (double value = 0.0; words >> value;) row.push_back(value);
     if (!words.eof() || (row.size() != 3 && row.size() != 6)) {
-      refuse(file.string() + ':' + std::to_string(number), "expected three coordinates, or these and a normal", line.size() > 60 ? line.substr(0, 60) + "..." : line, "");
+      refuse(file.string() + ':' + std::to_string(number), "expected three coordinates, or these and a normal", line.size() > 60 ? line.substr(0, 60) + "..." : line, "remove lines that are no points");
     }
     out.emplace_back(Point(row[0], row[1], row[2]), row.size() == 6 ? Vector(row[3], row[4], row[5]) : Vector(0.0, 0.0, 0.0));
     if (out.size() > kMost) refuse(file, "expected at most " + std::to_string(kMost) + " points", "more", "thin them out", ErrorKind::Limit);
@@ -83,14 +83,14 @@ double diagonal_of(const std::vector<Oriented>& points) {
 void thin_out(const std::filesystem::path& file, double error, std::vector<Oriented>& points) {
   for (const Oriented& p : points) {
     for (int k = 0; k < 3; ++k) {
-      if (!(std::abs(p.first[k]) <= io::kLargestNumber && std::abs(p.second[k]) <= io::kLargestNumber)) refuse(file, "expected finite coordinates", short_number(p.first[k]), "");
+      if (!(std::abs(p.first[k]) <= io::kLargestNumber && std::abs(p.second[k]) <= io::kLargestNumber)) refuse(file, "expected finite coordinates", short_number(p.first[k]), "remove points without a place");
     }
   }
   const auto before = [](const Oriented& a, const Oriented& b) { return a.first < b.first; };
   const auto equal = [](const Oriented& a, const Oriented& b) { return a.first == b.first; };
   std::stable_sort(points.begin(), points.end(), before);
   points.erase(std::unique(points.begin(), points.end(), equal), points.end());
-  if (points.size() < kFewest) refuse(file, "expected at least " + std::to_string(kFewest) + " different points", std::to_string(points.size()), "");
+  if (points.size() < kFewest) refuse(file, "expected at least " + std::to_string(kFewest) + " different points", std::to_string(points.size()), "sample the surface more densely");
   if (points.size() <= kEnough) return;
   points.erase(CGAL::grid_simplify_point_set(points, 0.25 * error * diagonal_of(points), CGAL::parameters::point_map(PointMap())), points.end());
 }

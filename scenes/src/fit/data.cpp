@@ -51,12 +51,12 @@ DataKind kind_of(const std::filesystem::path& file) {
   const bool mesh = is_one_of(kMeshes), volume = is_one_of(kVolumes);
   if (!mesh && !volume && extension != ".xyz") {
     refuse(file, "expected a mesh (.ply, .obj, .off, .stl), points (.xyz, .ply) or a volume (.nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .vdb)",
-           extension.empty() ? "no extension" : '\'' + extension + '\'', "", ErrorKind::Usage);
+           extension.empty() ? "no extension" : '\'' + extension + '\'', "convert the data, or rename a file of another extension", ErrorKind::Usage);
   }
   std::array<std::byte, 1> first{};
   const std::optional<std::size_t> found = io::read_start(file, first);
   if (!found) (void)io::read_file(file, first.size());  // which says why
-  if (found == 0) refuse(file, "expected data", "an empty file", "");
+  if (found == 0) refuse(file, "expected data", "an empty file", "write it again");
   if (extension == ".ply" && !ply_has_faces(file)) return DataKind::Points;
   return mesh ? DataKind::Mesh : volume ? DataKind::Volume : DataKind::Points;
 }

@@ -43,7 +43,7 @@ class Header {
       end_ = static_cast<std::size_t>(in.tellg());
       return;
     }
-    refuse(file_.string() + ':' + std::to_string(line_), "expected lines of a MetaImage header, Key = Value, up to ElementDataFile", line.empty() ? "none" : '\'' + line.substr(0, 40) + '\'', "");
+    refuse(file_.string() + ':' + std::to_string(line_), "expected lines of a MetaImage header, Key = Value, up to ElementDataFile", line.empty() ? "none" : '\'' + line.substr(0, 40) + '\'', "write the header again, its last line is ElementDataFile = FILE or LOCAL");
   }
 
   [[nodiscard]] std::size_t end() const { return end_; }
@@ -57,7 +57,7 @@ class Header {
       std::istringstream words(value_.at(key));
       std::vector<double> out;
       for (double v = 0.0; words >> v;) out.push_back(v);
-      if (!words.eof() || out.size() != otherwise.size()) refuse(file_, "expected " + std::to_string(otherwise.size()) + " numbers after " + key, '\'' + value_.at(key) + '\'', "");
+      if (!words.eof() || out.size() != otherwise.size()) refuse(file_, "expected " + std::to_string(otherwise.size()) + " numbers after " + key, '\'' + value_.at(key) + '\'', "one for each axis");
       return out;
     }
     return otherwise;
@@ -81,13 +81,13 @@ std::vector<char> read_bytes(const std::filesystem::path& file, const Header& he
   if (name == "LIST" || name.find('%') != std::string::npos) refuse(file, "expected voxels in one file", '\'' + name + '\'', "join its slices");
   const std::filesystem::path data = local ? file : file.parent_path() / name;
   std::ifstream in(data, std::ios::binary | std::ios::ate);
-  if (!in) refuse(data, "expected the voxels of " + file.filename().string(), "no file that can be read", "", ErrorKind::Io);
+  if (!in) refuse(data, "expected the voxels of " + file.filename().string(), "no file that can be read", "ElementDataFile names it, relative to the header", ErrorKind::Io);
   const auto size = static_cast<std::size_t>(in.tellg());
   const double skipped = header.numbers({"HeaderSize"}, {0.0})[0];
   const bool packed = header.is_true("CompressedData");
   const std::size_t begin = local ? header.end() : skipped < 0.0 ? size - std::min(size, bytes) : static_cast<std::size_t>(std::min(skipped, 1e15));
   const auto expect = [&](bool good, std::size_t found) {
-    if (!good) refuse(data, "expected " + std::to_string(bytes) + " bytes of voxels", std::to_string(found), "", ErrorKind::Io);
+    if (!good) refuse(data, "expected " + std::to_string(bytes) + " bytes of voxels", std::to_string(found), "copy the file again, or correct DimSize and ElementType", ErrorKind::Io);
   };
   expect(begin <= size && (packed || size - begin >= bytes), size - std::min(begin, size));
   std::vector<char> stored(packed ? size - begin : bytes);
@@ -137,7 +137,7 @@ Volume read_meta_image(const std::filesystem::path& file) {
   }
   const std::string type = header.text("ElementType");
   const auto known = std::find_if(kTypes.begin(), kTypes.end(), [&](const NamedType& t) { return type == t.name; });
-  if (known == kTypes.end()) refuse(file, "expected an ElementType from MET_CHAR to MET_DOUBLE", '\'' + type + '\'', "");
+  if (known == kTypes.end()) refuse(file, "expected an ElementType from MET_CHAR to MET_DOUBLE", '\'' + type + '\'', "convert the voxels to MET_FLOAT");
   const std::vector<double> count = header.numbers({"DimSize"}, {0.0, 0.0, 0.0});
   expect_voxels(file, {count[0], count[1], count[2]});
   Volume out;

@@ -91,7 +91,7 @@ Volume read_nifti(const std::filesystem::path& file) {
   expect_axes(file, out);
   const NiftiImage image(is_complete(file, *header) ? nifti_image_read(file.c_str(), 1) : nullptr);
   if (!image) refuse_bytes(file, "the voxels that the header tells of", ErrorKind::Io);
-  if (!copy_nifti(*image, out.value)) refuse(file, "expected voxels that are numbers", nifti_datatype_string(image->datatype), "");
+  if (!copy_nifti(*image, out.value)) refuse(file, "expected voxels that are numbers", nifti_datatype_string(image->datatype), "convert them to float");
   if (image->scl_slope != 0.0F) {
     for (float& v : out.value) v = image->scl_slope * v + image->scl_inter;
   }

@@ -86,14 +86,14 @@ Soup read_soup(const std::filesystem::path& file) {
     for (const Vec3& p : mesh.position) soup.points.emplace_back(p.x(), p.y(), p.z());
     for (const auto& t : mesh.triangle) soup.faces.push_back({t[0], t[1], t[2]});
   }
-  if (soup.faces.empty()) refuse(file, "expected triangles", "none", "");
+  if (soup.faces.empty()) refuse(file, "expected triangles", "none", "points without faces are read from .xyz and .ply");
   for (const std::vector<std::size_t>& face : soup.faces) {
     for (const std::size_t corner : face) {
-      if (corner >= soup.points.size()) refuse(file, "expected corners among the " + counted(soup.points.size(), "vertex", "vertices"), std::to_string(corner), "");
+      if (corner >= soup.points.size()) refuse(file, "expected corners among the " + counted(soup.points.size(), "vertex", "vertices"), std::to_string(corner), "write the mesh again: a face names a vertex that is not there");
     }
   }
   for (const Point& p : soup.points) {
-    if (!std::isfinite(p.x()) || !std::isfinite(p.y()) || !std::isfinite(p.z())) refuse(file, "expected finite coordinates", text_of(p), "");
+    if (!std::isfinite(p.x()) || !std::isfinite(p.y()) || !std::isfinite(p.z())) refuse(file, "expected finite coordinates", text_of(p), "remove vertices without a place");
   }
   return soup;
 }
@@ -173,7 +173,7 @@ Soup soup_of(const Mesh& mesh) {
 /// The surface of the data, as it is.
 Soup read_data(const std::filesystem::path& file, const FitOptions& options, Repair& repair, const Executor& executor) {
   const DataKind kind = kind_of(file);
-  if (kind != DataKind::Volume && options.volume.given()) refuse(file, "expected a volume, of which --iso, --window and --label choose a part", "another kind of data", "", ErrorKind::Usage);
+  if (kind != DataKind::Volume && options.volume.given()) refuse(file, "expected a volume, of which --iso, --window and --label choose a part", "another kind of data", "leave these options out", ErrorKind::Usage);
   if (kind == DataKind::Volume) {
     Volume volume = extension_of(file) == ".vdb" ? read_vdb(file) : read_image(file);
     return soup_of(surface_of_volume(file, std::move(volume), options, repair, executor));
@@ -189,7 +189,7 @@ Mesh read_surface(const std::filesystem::path& file, const FitOptions& options, 
   pmp::repair_polygon_soup(soup.points, soup.faces);
   expect_two_faces_at_edges(file, soup);
   pmp::orient_polygon_soup(soup.points, soup.faces);
-  if (soup.faces.empty() || !pmp::is_polygon_soup_a_polygon_mesh(soup.faces)) refuse(file, "expected triangles that form a surface", "none", "");
+  if (soup.faces.empty() || !pmp::is_polygon_soup_a_polygon_mesh(soup.faces)) refuse(file, "expected triangles that form a surface", "none", "repair the mesh in a mesh editor");
   SurfaceMesh mesh;
   pmp::polygon_soup_to_polygon_mesh(soup.points, soup.faces, mesh);
   pmp::triangulate_faces(mesh);

@@ -17,7 +17,7 @@ FloatGrid::Ptr read_grid(const std::filesystem::path& file) try {
   for (const openvdb::GridBase::Ptr& grid : *grids) {
     if (grid->isType<FloatGrid>()) return openvdb::gridPtrCast<FloatGrid>(grid);
   }
-  refuse(file, "expected a grid of floats", std::to_string(grids->size()) + " grids of other kinds", "");
+  refuse(file, "expected a grid of floats", std::to_string(grids->size()) + " grids of other kinds", "write a signed distance or a density as floats");
 } catch (const openvdb::Exception&) {
   refuse(file, "expected a file of OpenVDB", "bytes that are none, or that end early", "the extension says how a file is read");
 }
@@ -27,9 +27,9 @@ FloatGrid::Ptr read_grid(const std::filesystem::path& file) try {
 Volume read_vdb(const std::filesystem::path& file) {
   const FloatGrid::Ptr grid = read_grid(file);
   const openvdb::math::Transform& transform = grid->transform();
-  if (!transform.isLinear()) refuse(file, "expected a grid with straight axes", "one with perspective", "");
+  if (!transform.isLinear()) refuse(file, "expected a grid with straight axes", "one with perspective", "resample it to a grid with straight axes");
   openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
-  if (box.empty()) refuse(file, "expected a grid with values", "an empty one", "");
+  if (box.empty()) refuse(file, "expected a grid with values", "an empty one", "write it again with active voxels");
   box.expand(1);  // what the values change to beyond them
   const openvdb::Coord size = box.dim();
   expect_voxels(file, {static_cast<double>(size.x()), static_cast<double>(size.y()), static_cast<double>(size.z())});

@@ -365,15 +365,13 @@ TEST(KeptMeshes, ToAnErrorTakeNoMoreThanAllowed) {
     const std::string made = within_error(mesher, body, kError, Executor(1), &all);
     (void)within_error(mesher, body, kError, Executor(1), &counts);
     ASSERT_EQ(counts.tiles_sampled, 0u);
-    const Mesh& mesh = mesher.make(body.field, {.lattice = lattice_of(0.0), .error = kError}, Executor(1), &counts);
-    const std::uint64_t of_mesh = mesh.vertex_count() * 2 * sizeof(Vec3) + mesh.triangle_count() * sizeof(mesh.triangle[0]);
-    const std::uint64_t most = counts.bytes + of_mesh - 1;
+    const std::uint64_t most = mesher.kept_to_error() - 1;
     auto less = mesher_of(most), none = mesher_of(std::uint64_t{0});
     std::uint64_t sampled = 0;
     constexpr int kMore = 3;
     for (int round = 0; round < 1 + kMore; ++round) {
       EXPECT_EQ(within_error(less, body, kError, Executor(1), &counts), made);
-      EXPECT_LE(counts.bytes, most - of_mesh);
+      EXPECT_LE(less.kept_to_error(), most);
       if (round > 0) sampled += counts.tiles_sampled;
       EXPECT_EQ(within_error(none, body, kError, Executor(1), &counts), made);
       EXPECT_EQ(counts.bytes, 0u);

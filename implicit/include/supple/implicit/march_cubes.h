@@ -68,7 +68,8 @@ class CubeMesher {
   /// Vertices are within 1e-4 of a cell of the surface (RMS). Refined vertices leave the lattice's edges; where triangles would then intersect, as
   /// at a neck about to close, they stay in the middle of the edge that they split.
   /// With options.error, a body of separate balls is found completely: half a support is a cell that no ball of its surface passes
-  /// through. Triangles get shorter by sqrt(2) until the error is met, first by at most two refinements, then by smaller cells.
+  /// through. Triangles get shorter by sqrt(2) until the error is met, first by at most two refinements, then by smaller cells; as soon as dividing
+  /// those that are too far from the surface takes fewer triangles, these alone are divided.
   /// Distances are |F| / |grad F|, or by Newton's method where the surface turns within a triangle.
   /// @throws Error{Limit} before taking memory when the box of the body holds more than kMarchNodes nodes; with options.error,
   /// as soon as no mesh within kMarchNodes nodes and 8 GB can be expected to meet it.

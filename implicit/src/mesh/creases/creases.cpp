@@ -10,6 +10,7 @@
 #include "mesh/creases/crease_sharpening.h"
 #include "mesh/cubes/march_tried.h"
 #include "mesh/error_search.h"
+#include "mesh/local_division.h"
 #include "mesh/triangle_errors.h"
 #include "supple/core/error.h"
 
@@ -168,7 +169,8 @@ struct CreaseMesher::Impl {
 
   CreaseMarcher fixed;  ///< of the last mesh without an error
   march::TriedLattices<CreaseMarcher> tried;
-  Mesh alone;           ///< where no data are kept
+  LocalDivision division;
+  Mesh alone;           ///< where no data are kept of it
 
   // For make_to_error.
   static march::LevelPlan plan_of(double first, int level) { return {.cell = spacing_at(first, level)}; }
@@ -177,6 +179,8 @@ struct CreaseMesher::Impl {
     return on.make(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor);
   }
   static double error_on(CreaseMarcher& on, const march::LevelPlan& /*plan*/, const Executor& executor) { return on.error(executor); }
+  /// Divided triangles would not end on the creases.
+  static const Mesh* divide(const FieldView&, const Mesh&, double, std::size_t, const Executor&) { return nullptr; }
   static Mesh take_mesh(CreaseMarcher& on, const march::LevelPlan& /*plan*/) { return on.take_mesh(); }
   static std::uint64_t bytes_beside() { return 0; }
   static void forget_beside() {}

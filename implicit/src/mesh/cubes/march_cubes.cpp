@@ -8,6 +8,7 @@
 #include "mesh/cubes/march_refined.h"
 #include "mesh/cubes/march_tried.h"
 #include "mesh/error_search.h"
+#include "mesh/local_division.h"
 #include "mesh/partition/polygonise_blocks.h"
 #include "supple/core/error.h"
 #include "supple/implicit/field.h"
@@ -61,7 +62,8 @@ struct CubeMesher::Impl {
   march::RefinedMarcher fixed;  ///< of the last mesh without an error
   march::TriedLattices<march::RefinedMarcher> tried;
   march::CutScratch scratch;
-  Mesh alone;  ///< where no data are kept
+  LocalDivision division;
+  Mesh alone;  ///< where no data are kept of it
 
   // For make_to_error. Triangles are divided, up to twice, before cells get smaller.
   static march::LevelPlan plan_of(double first, int level) {
@@ -75,6 +77,9 @@ struct CubeMesher::Impl {
     return on.mesh(plan.refinements, options.may_cross, executor, scratch);
   }
   static double error_on(march::RefinedMarcher& on, const march::LevelPlan& plan, const Executor& executor) { return on.error(plan.refinements, executor); }
+  const Mesh* divide(const FieldView& field, const Mesh& mesh, double error, std::size_t most, const Executor& executor) {
+    return division.divide(field, mesh, error, most, executor);
+  }
   static Mesh take_mesh(march::RefinedMarcher& on, const march::LevelPlan& plan) { return on.take_mesh(plan.refinements); }
   [[nodiscard]] std::uint64_t bytes_beside() const { return scratch.bytes(); }
   void forget_beside() { scratch = {}; }

@@ -147,7 +147,10 @@ void move_triangles(const BlockTable& table, const std::vector<Run>& runs, std::
 void place_points(BlockTable& table, std::span<const std::uint32_t> blocks, std::span<const std::uint32_t> counted, std::size_t vertices,
                   bool none_stays, std::vector<EdgePoint>& points) {
   const auto for_kept = [](const Block& block, const auto& use) {
-    for_bits(block.held & ~block.solve, [&](unsigned place) { use(block.tile[block.rank(place)]); });
+    for_bits(block.held & ~block.solve, [&](unsigned place) {
+      const Tile& tile = block.tile[block.rank(place)];
+      if (tile.vertices > 0) use(tile);
+    });
   };
   if (none_stays || 2 * points.size() > 3 * vertices) {  // in the order of vertices
     std::vector<EdgePoint> last;

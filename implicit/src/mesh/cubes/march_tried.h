@@ -126,8 +126,8 @@ struct LevelPlan {
   int refinements = 0;
 };
 
-/// Makes meshes of rising level until one meets options.error, and keeps their data within the limit.
-/// @param of    has `tried`, TriedLattices<OnLattice>; `alone`, the mesh where nothing is kept of it; plan_of(first cell, level);
+/// Makes meshes of rising level until one meets options.error, alone or with some of its triangles divided, and keeps their data within the limit.
+/// @param of    has `tried`, TriedLattices<OnLattice>; divide(), as LocalDivision, and `division`; `alone`, the mesh where nothing is kept of it; plan_of(first cell, level);
 ///              mesh_on(on, first_time, plan, field, options, executor), where first_time says that this call makes the first mesh of the
 ///              lattice; error_on(on, plan, executor); take_mesh(on, plan); and bytes_beside() and forget_beside() of what is kept
 ///              beside the lattices [byte]
@@ -136,7 +136,7 @@ template <class Of, class AnyField>
 const Mesh* make_to_error(Of& of, const AnyField& field, const MarchOptions& options, const Executor& executor, MarchCounts& count,
                           std::uint64_t most = ~std::uint64_t{0}) {
   const double first = first_cell(field, options.lattice.cell);
-  const Mesh* mesh = nullptr;
+  const Mesh *mesh = nullptr, *divided = nullptr;
   decltype(&of.tried.use(first).first) last = nullptr;
   LevelPlan plan;
   std::uint64_t sampled = 0, values = 0;  // of all meshes
@@ -158,6 +158,12 @@ const Mesh* make_to_error(Of& of, const AnyField& field, const MarchOptions& opt
     }
     size.add(level, *mesh);
     of.tried.fit(plan.cell, of.bytes_beside());
+    // The next level has twice as many triangles: where fewer do by dividing those that are too far from the surface, the cells stay.
+    divided = error > options.error ? of.divide(field, *mesh, options.error, 2 * mesh->triangle_count(), executor) : nullptr;
+    if (divided != nullptr) {
+      count.error = of.division.error();
+      return LevelTry{.error = count.error};
+    }
     return try_kept(error, *mesh, on, executor);
   });
   if (size.is_exceeded()) {
@@ -167,9 +173,15 @@ const Mesh* make_to_error(Of& of, const AnyField& field, const MarchOptions& opt
   count.tiles_sampled = sampled;
   count.kernel_values = values;
   const bool fits = of.tried.end_call(plan.cell, of.bytes_beside());
-  count.bytes = fits ? of.tried.bytes() + of.bytes_beside() - bytes_of(*mesh) : 0;
-  if (fits) return mesh;
-  of.alone = of.take_mesh(*last, plan);
+  if (divided != nullptr) {
+    of.alone = of.division.take();
+    count.bytes = fits ? of.tried.bytes() + of.bytes_beside() : 0;
+  } else {
+    count.bytes = fits ? of.tried.bytes() + of.bytes_beside() - bytes_of(*mesh) : 0;
+    if (fits) return mesh;
+    of.alone = of.take_mesh(*last, plan);
+  }
+  if (fits) return &of.alone;
   of.tried.clear();
   of.forget_beside();
   return &of.alone;
