@@ -14,10 +14,6 @@
 namespace supple::collision {
 namespace {
 
-/// What flows through what third bodies leave of Sigma is shared out among pairs in another way than the energy of the space that they lose: both are right in
-/// their sums, but do not mix. Errors finer than this are met where all pairs tell the former.
-constexpr double kAllFlow = 1e-7;
-
 /// Error below which panels may miss slivers of that size between their nodes.
 constexpr double kFinestPanels = 1e-4;
 
@@ -192,8 +188,7 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   const double error = job.settings().error;
   const bool star = stars_cut(job, std::max(error, kFinestPanels), out), coarse = error >= kFinestPanels;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
-  const bool unsure = out.points.unsure[0] || out.points.unsure[1];  // of what a body loses that is not known to be convex
-  if (star && coarse && !small && !unsure && (out.points.point.empty() || meets(out, error))) return true;
+  if (star && coarse && !small && (out.points.point.empty() || meets(out, error))) return true;
   std::swap(kept_, out);
   out.summary.bodies = job.pair;
   if (!imprints_cut(job, out)) return false;
@@ -332,7 +327,7 @@ bool PairSolver::stars_cut(const Job& job, double asked, PairResult& out) {
     }
     PanelOutcome outcome;
     const Vec3& origin = cover.frame.origin;
-    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, job.polar.regions, origin, job.settings().energy, false, &cover, imprints_, third_bodies_}, panel_room_, out.points, outcome)) return false;
+    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, job.polar.regions, origin, job.settings().energy, false, &cover, imprints_, apex_}, panel_room_, out.points, outcome)) return false;
     const PatchSums& sums = outcome.sums;
     out.add(sums, origin);
     share_.push_back({sums.force, sums.first + sums.load * origin, sums.load, sums.area, outcome.estimate});
@@ -462,7 +457,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   if (fits && !patches_.empty()) {
     out.summary.rule = ContactRule::Polar;
     const Pressing pressing = third_.empty() ? Pressing::None : thirds_press(job, out);
-    cut_by_thirds_ = pressing == Pressing::None && !third_.empty() && job.settings().energy && thirds_press_beside(job, out);
+    cut_by_thirds_ = pressing == Pressing::None && !third_.empty() && fills_regions(job) && thirds_press_beside(job, out);
     if (pressing == Pressing::All) {
       fill_beyond_thirds(job, out);
       return;
@@ -499,7 +494,7 @@ void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
   const double error = region_error(job.settings());
   PatchPoints& points = out.points;
   const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, error);
-  const bool cut = job.settings().energy && cut_by_thirds_ && job.settings().error >= kAllFlow;
+  const bool cut = job.settings().energy && cut_by_thirds_;
   for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || cut || points.unsure[side]);
   if (points.point.empty() || !(points.unsure[0] || points.unsure[1])) return;
   take_all_thirds(job);
@@ -517,7 +512,7 @@ void PairSolver::fill_beyond_thirds(const Job& job, PairResult& out) {
   const Vec3 across = out.points.normal[peak];
   out.clear();
   out.summary.reason = RuleReason::ThirdBody;
-  if (!job.settings().energy || job.settings().error < kAllFlow) return;
+  if (!job.settings().energy) return;
   take_all_thirds(job);
   for (const int side : {0, 1}) {
     if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None) continue;
@@ -560,6 +555,34 @@ void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> soft
     region_.fill({pressure, side, third_bodies_, region_error(job.settings()), equal}, job.overlap, Vec3::UnitZ(), out.points);
     out.summary.reason = RuleReason::Within;
     return;
+  }
+}
+
+/// What a convex body loses to several others flows out of one place of it through Sigma of all its pairs: such sides need no region. Obstacles lose to
+/// each other what they do not press hardest on, which no Sigma bounds.
+void PairSolver::find_apexes(Job& job, const Partners& partners) {
+  if (third_.empty()) return;
+  for (const std::size_t side : {0u, 1u}) {
+    if (job.polar.regions[side] != Region::Sums) continue;
+    const std::uint32_t body = side == 0 ? job.pair.a : job.pair.b, other = job.pair.a + job.pair.b - body;
+    const auto fixed = [&job](std::uint32_t c) { return job.bodies[c].fixed; };
+    if (fixed(body) && std::any_of(third_.begin(), third_.end(), fixed)) continue;
+    others_.clear();
+    for (const std::uint32_t c : partners.of(body)) others_.push_back(&job.bodies[c]);
+    std::size_t taker = 0;
+    apex_[side] = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, taker);
+    if (!apex_[side]) continue;
+    const std::uint32_t by = partners.of(body)[taker];
+    apex_[side]->lost = apex_[side]->lost && (by == other || (team_ != nullptr && fixed(other) && std::binary_search(team_->member.begin(), team_->member.end(), by)));
+    job.polar.regions[side] = Region::None;
+  }
+}
+
+void PairSolver::add_flows(const Job& job, PairResult& out) {
+  for (const std::size_t side : {0u, 1u}) {
+    if (!apex_[side] || (out.points.point.empty() && !apex_[side]->lost)) continue;
+    add_flow(job.polar.pressure, static_cast<int>(side), *apex_[side], job.settings().error, out.points);
+    if (out.points.point.empty()) out.summary.reason = RuleReason::Within;
   }
 }
 
@@ -606,12 +629,15 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
   job.polar.faces = convex && !job.polar.axis && is_finite(overlap);
   const bool equal = coincide(a, b);
   const std::optional<int> softer = equal ? std::nullopt : softer_of_nested_balls(a, b);
+  apex_ = {};
+  if (!equal) find_apexes(job, partners);
   if (!equal && !softer) {
     find_patches(job);
     choose(job, out);
     fill_unsure_regions(job, out);
   }
   fill_within(job, equal, softer, out);
+  add_flows(job, out);
 
   ContactSurface::Summary& summary = out.summary;
   summary.load = out.load;

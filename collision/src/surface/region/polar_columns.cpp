@@ -90,7 +90,6 @@ void PolarRuleSolver::evaluate_on_lines(PairPressure& pressure, int side) {
 bool PolarRuleSolver::start_columns(int side) {
   const std::size_t n = node_.size();
   const double sign = side == 0 ? 1.0 : -1.0, spread = spread_[side];
-  if (apex_[side] && start_out_of(*apex_[side], sign)) return true;
   column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, {{1.0, 0.0, 0.0}}});
   if (spread == 0.0) return true;
   for (std::size_t i = 0; i <= n; ++i) {
@@ -100,20 +99,6 @@ bool PolarRuleSolver::start_columns(int side) {
     const double narrow = i < n ? 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis) : 1.0;
     if (!(narrow > 0.0)) return false;
     along.swept = {{narrow, spread * (1.0 + narrow), spread * spread}};
-  }
-  return true;
-}
-
-/// @return false where the rule's axis does not lead out of the apex
-bool PolarRuleSolver::start_out_of(const Apex& apex, double sign) {
-  const std::size_t n = node_.size();
-  column_.resize(n + 1);
-  for (std::size_t i = 0; i <= n; ++i) {
-    const Vec3 x = i < n ? node_.point[i] : peak_, way = apex.way(x), normal = i < n ? normal_[i] : frame_.axis;
-    const double along = sign * way.dot(frame_.axis);
-    if (!(along > kLeastSight)) return false;
-    const double flux = sign * normal.dot(way) / (along * normal.dot(frame_.axis)), bend = 1.0 / (along * apex.distance(x));
-    column_[i] = {way / along, swept_out_of_apex(flux, bend)};
   }
   return true;
 }
@@ -203,11 +188,11 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, d
     return true;
   }
   if (!fits) return false;
-  if (spread_[side] > 0.0 || apex_[side]) nodes = kMostOnColumn;
+  if (spread_[side] > 0.0) nodes = kMostOnColumn;
   // The length is off by the square of the last step. From beyond the surface, where a kernel may change its formula, the slope is by as much as the place.
   const double inside = std::min(1e-3, 0.1 * std::sqrt(error));
   if (!column_ends(pressure, side, from_ends ? std::min(1e-3, error) : inside, inside)) return false;
-  if (!pressure.field(side).convex() && !apex_[side] && !end_within(pressure, side)) {
+  if (!pressure.field(side).convex() && !end_within(pressure, side)) {
     points.unsure[side] = true;
     thickness_ += frame_.depth[side];
     return true;
