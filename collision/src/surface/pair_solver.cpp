@@ -14,6 +14,9 @@
 namespace supple::collision {
 namespace {
 
+/// Of the area of patches: a star tells imprints that take less from each other by few of its rays.
+constexpr double kSmall = 0.05;
+
 /// Error below which panels may miss slivers of that size between their nodes.
 constexpr double kFinestPanels = 1e-4;
 
@@ -175,17 +178,25 @@ bool PairSolver::thirds_press_beside(const Job& job, const PairResult& out) {
 }
 
 /// Polar patches again, cut where `third_bodies_` press harder. A star tells more of where they do, but is slow where its rays touch a small imprint or a
-/// face has corners: there patches are parted about the imprints themselves, which a star that is not as fine has to confirm.
+/// face has corners: there patches are parted about the imprints themselves, which their size, or a star that is not as fine, has to confirm.
 /// @return false where neither fits, or they contradict each other
 bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   if (job.a.pose.size() > 1 || job.b.pose.size() > 1) return false;  // their squeezed regions are not cut that exactly
-  constexpr double kSafety = 3.0;
-  constexpr double kSmall = 0.05;  // of the area of the patches: a star tells imprints that take less from each other by few of its rays
-  const double whole = out.summary.area;
+  constexpr double kSafety = 3.0, kOfSize = 0.1;  // sizes of imprints are good to that
+  const double whole = out.summary.area, of_whole = out.summary.error_estimate;
   const std::span<const PolarCover> covers = patches_.covers();
   const bool faces = std::any_of(covers.begin(), covers.end(), [](const PolarCover& cover) { return cover.frame.flat; });
   if (faces) return imprints_cut(job, out);
   const double error = job.settings().error;
+  if (little_ && kOfSize * little_->area <= error) {
+    if (imprints_cut(job, out)) {
+      const double off = std::abs(1.0 - little_->area - out.summary.area / whole);
+      out.summary.error_estimate += std::max(off - of_whole, 0.0);
+      if (meets(out, error)) return true;
+    }
+    out.clear();
+    if (!rings(job, error, out)) return false;
+  }
   const bool star = stars_cut(job, std::max(error, kFinestPanels), out), coarse = error >= kFinestPanels;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
   if (star && coarse && !small && (out.points.point.empty() || meets(out, error))) return true;
@@ -198,10 +209,9 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   return coarse || off <= kSafety * (kept_.summary.error_estimate + out.summary.error_estimate);
 }
 
-/// What the imprints of `third_bodies_` take of the patches, as in ContactSettings::error. @return nothing where that is not known, or more than `most`
-std::optional<double> PairSolver::taken_by_imprints(const Job& job, double most, const PairResult& out) {
-  constexpr double kSafety = 1.25;  // sizes are good to a tenth
-  double area = 0.0, force = 0.0;
+/// What the imprints of `third_bodies_` take of the patches. @return nothing where that is not known, or more than a small part
+std::optional<PairSolver::Taken> PairSolver::taken_by_imprints(const Job& job, const PairResult& out) {
+  Taken taken;
   for (const ContactBody* const third : third_bodies_) {
     if (!third->field.convex()) return std::nullopt;  // it may have several imprints on a patch
     for (const PolarCover& cover : patches_.covers()) {
@@ -209,31 +219,35 @@ std::optional<double> PairSolver::taken_by_imprints(const Job& job, double most,
       if (!inside) continue;
       const std::optional<ImprintSize> size = imprint_.measure(job.polar.pressure, cover, *third, *inside);
       if (!size) return std::nullopt;
-      area += kSafety * size->share;
-      force += kSafety * size->share * size->pressure * out.summary.area / out.load;
-      if (!(std::max(area, force) <= most)) return std::nullopt;
+      taken.area += size->share;
+      taken.force += size->share * size->pressure * out.summary.area / out.load;
+      if (!(taken.area <= kSmall)) return std::nullopt;
     }
   }
-  return std::max(area, force);
+  return taken;
 }
 
 /// Whether imprints are so small that the patches stay within the given error as they are, or solved a little finer. The estimate grows by what imprints take.
 bool PairSolver::may_leave_imprints(const Job& job, PairResult& out) {
-  constexpr double kMost = 0.8;  // of the error: finer patches cost more than cut ones
+  constexpr double kMost = 0.8;     // of the error: finer patches cost more than cut ones
+  constexpr double kSafety = 1.25;  // sizes are good to a tenth
   const double error = job.settings().error;
+  little_.reset();
   if (!(out.load > 0.0)) return false;
-  const std::optional<double> taken = taken_by_imprints(job, kMost * error, out);
-  if (!taken) return false;
-  if (out.summary.error_estimate + *taken > error) {
+  little_ = taken_by_imprints(job, out);
+  if (!little_) return false;
+  const double taken = kSafety * std::max(little_->area, little_->force);
+  if (!(taken <= kMost * error)) return false;
+  if (out.summary.error_estimate + taken > error) {
     out.clear();
-    if (!rings(job, error - *taken, out) || out.summary.error_estimate + *taken > error) {
+    if (!rings(job, error - taken, out) || out.summary.error_estimate + taken > error) {
       out.clear();
       rings(job, error, out);
       return false;
     }
     out.summary.rule = ContactRule::Polar;
   }
-  out.summary.error_estimate += *taken;
+  out.summary.error_estimate += taken;
   return true;
 }
 

@@ -75,7 +75,11 @@ class PairSolver {
   bool imprints_cut(const Job& job, PairResult& out);
   bool stars_cut(const Job& job, double asked, PairResult& out);
   bool polar_cut(const Job& job, PairResult& out);
-  std::optional<double> taken_by_imprints(const Job& job, double most, const PairResult& out);
+  /// What imprints take of the patches, over their area and force, to about a tenth: the latter at most.
+  struct Taken {
+    double area = 0.0, force = 0.0;
+  };
+  std::optional<Taken> taken_by_imprints(const Job& job, const PairResult& out);
   bool may_leave_imprints(const Job& job, PairResult& out);
   bool march(const Job& job, PairResult& out, bool alone = false);
   bool panels(const Job& job, PairResult& out);
@@ -117,6 +121,7 @@ class PairSolver {
   std::array<std::optional<Apex>, 2> apex_{};  ///< that what A, B lose to several bodies flows out of
   std::vector<const ContactBody*> others_;
   bool cut_by_thirds_ = false;       ///< a third body may press harder on a part of Sigma, or of what the bodies lose
+  std::optional<Taken> little_;      ///< where that is little
   PairResult kept_;  ///< what another rule has left
 };
 

@@ -131,7 +131,6 @@ bool PolarRuleSolver::end_within(PairPressure& pressure, int side) {
 /// at whose end the pressure of the other body falls. @param ended  the columns are there; else lines along the axis
 bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended) {
   constexpr std::size_t kFew = 8;
-  constexpr int kSteps = 4;
   const std::size_t n = node_.size(), stride = (n + kFew - 1) / kFew;
   const Vec3 axis = (side == 0 ? 1.0 : -1.0) * frame_.axis;
   const auto way = [&](std::size_t i) { return ended ? column(i).way : axis; };
@@ -139,16 +138,22 @@ bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended)
   for (std::size_t i = 0; i < n; i += stride) open_.push_back(i);
   open_.push_back(n);
   some_.resize(open_.size());
-  for (std::size_t k = 0; k < open_.size(); ++k) {
-    const std::size_t i = open_[k];
-    some_.point[k] = (i < n ? node_.point[i] : peak_) + (ended ? end_[side][i] : frame_.depth[side]) * way(i);
-  }
-  for (int step = 0; step < kSteps && !ended; ++step) {
+  std::vector<double> length, low(open_.size(), 0.0), high(open_.size(), kInfinity);
+  for (const std::size_t i : open_) length.push_back(ended ? end_[side][i] : frame_.depth[side]);
+  const auto place = [&] {
+    for (std::size_t k = 0; k < open_.size(); ++k) some_.point[k] = (open_[k] < n ? node_.point[open_[k]] : peak_) + length[k] * way(open_[k]);
+  };
+  place();
+  for (int step = 0; step < kFreeSteps && !ended; ++step) {
     pressure.evaluate(side, some_.point, some_.a, some_.slope_a);
     for (std::size_t k = 0; k < open_.size(); ++k) {
-      const double fall = -some_.slope_a[k].dot(axis);
-      some_.point[k] += (fall > 0.0 ? std::clamp(some_.a[k] / fall, -frame_.depth[side], frame_.depth[side]) : frame_.depth[side]) * axis;
+      (some_.a[k] > 0.0 ? low : high)[k] = length[k];
+      const double fall = -some_.slope_a[k].dot(axis), newton = length[k] + some_.a[k] / fall;
+      length[k] = fall > 0.0 && newton > low[k] && newton < high[k] ? std::min(newton, length[k] + frame_.depth[side])
+                  : std::isfinite(high[k])                          ? 0.5 * (low[k] + high[k])
+                                                                    : length[k] + frame_.depth[side];
     }
+    place();
   }
   pressure.evaluate(1 - side, some_.point, some_.b, some_.slope_b);
   for (std::size_t k = 0; k < open_.size(); ++k) {
