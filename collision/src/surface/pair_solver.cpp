@@ -14,8 +14,8 @@
 namespace supple::collision {
 namespace {
 
-/// Of the area of patches: a star tells imprints that take less from each other by few of its rays.
-constexpr double kSmall = 0.05;
+/// To which sizes of imprints are known.
+constexpr double kOfSize = 0.1;
 
 /// Error below which panels may miss slivers of that size between their nodes.
 constexpr double kFinestPanels = 1e-4;
@@ -182,13 +182,14 @@ bool PairSolver::thirds_press_beside(const Job& job, const PairResult& out) {
 /// @return false where neither fits, or they contradict each other
 bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   if (job.a.pose.size() > 1 || job.b.pose.size() > 1) return false;  // their squeezed regions are not cut that exactly
-  constexpr double kSafety = 3.0, kOfSize = 0.1;  // sizes of imprints are good to that
+  constexpr double kSafety = 3.0;
+  constexpr double kSmall = 0.05;  // of the area of the patches: a star tells imprints that take less from each other by few of its rays
   const double whole = out.summary.area, of_whole = out.summary.error_estimate;
   const std::span<const PolarCover> covers = patches_.covers();
   const bool faces = std::any_of(covers.begin(), covers.end(), [](const PolarCover& cover) { return cover.frame.flat; });
   if (faces) return imprints_cut(job, out);
   const double error = job.settings().error;
-  if (little_ && kOfSize * little_->area <= error) {
+  if (little_) {
     if (imprints_cut(job, out)) {
       const double off = std::abs(1.0 - little_->area - out.summary.area / whole);
       out.summary.error_estimate += std::max(off - of_whole, 0.0);
@@ -209,7 +210,7 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   return coarse || off <= kSafety * (kept_.summary.error_estimate + out.summary.error_estimate);
 }
 
-/// What the imprints of `third_bodies_` take of the patches. @return nothing where that is not known, or more than a small part
+/// What the imprints of `third_bodies_` take of the patches. @return nothing where that is not known to the error asked
 std::optional<PairSolver::Taken> PairSolver::taken_by_imprints(const Job& job, const PairResult& out) {
   Taken taken;
   for (const ContactBody* const third : third_bodies_) {
@@ -221,7 +222,7 @@ std::optional<PairSolver::Taken> PairSolver::taken_by_imprints(const Job& job, c
       if (!size) return std::nullopt;
       taken.area += size->share;
       taken.force += size->share * size->pressure * out.summary.area / out.load;
-      if (!(taken.area <= kSmall)) return std::nullopt;
+      if (!(kOfSize * taken.area <= job.settings().error)) return std::nullopt;
     }
   }
   return taken;
@@ -230,7 +231,7 @@ std::optional<PairSolver::Taken> PairSolver::taken_by_imprints(const Job& job, c
 /// Whether imprints are so small that the patches stay within the given error as they are, or solved a little finer. The estimate grows by what imprints take.
 bool PairSolver::may_leave_imprints(const Job& job, PairResult& out) {
   constexpr double kMost = 0.8;     // of the error: finer patches cost more than cut ones
-  constexpr double kSafety = 1.25;  // sizes are good to a tenth
+  constexpr double kSafety = 1.25;
   const double error = job.settings().error;
   little_.reset();
   if (!(out.load > 0.0)) return false;
