@@ -14,9 +14,8 @@
 namespace supple::collision {
 namespace {
 
-/// What flows through what third bodies leave of Sigma is shared out among pairs in another way than the energy of the space that they lose: both are right in
-/// their sums, but do not mix. Errors finer than this are met where all pairs tell the former.
-constexpr double kAllFlow = 1e-7;
+/// To which sizes of imprints are known.
+constexpr double kOfSize = 0.1;
 
 /// Error below which panels may miss slivers of that size between their nodes.
 constexpr double kFinestPanels = 1e-4;
@@ -179,21 +178,29 @@ bool PairSolver::thirds_press_beside(const Job& job, const PairResult& out) {
 }
 
 /// Polar patches again, cut where `third_bodies_` press harder. A star tells more of where they do, but is slow where its rays touch a small imprint or a
-/// face has corners: there patches are parted about the imprints themselves, which a star that is not as fine has to confirm.
+/// face has corners: there patches are parted about the imprints themselves, which their size, or a star that is not as fine, has to confirm.
 /// @return false where neither fits, or they contradict each other
 bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   if (job.a.pose.size() > 1 || job.b.pose.size() > 1) return false;  // their squeezed regions are not cut that exactly
   constexpr double kSafety = 3.0;
   constexpr double kSmall = 0.05;  // of the area of the patches: a star tells imprints that take less from each other by few of its rays
-  const double whole = out.summary.area;
+  const double whole = out.summary.area, of_whole = out.summary.error_estimate;
   const std::span<const PolarCover> covers = patches_.covers();
   const bool faces = std::any_of(covers.begin(), covers.end(), [](const PolarCover& cover) { return cover.frame.flat; });
   if (faces) return imprints_cut(job, out);
   const double error = job.settings().error;
+  if (little_) {
+    if (imprints_cut(job, out)) {
+      const double off = std::abs(1.0 - little_->area - out.summary.area / whole);
+      out.summary.error_estimate += std::max(off - of_whole, 0.0);
+      if (meets(out, error)) return true;
+    }
+    out.clear();
+    if (!rings(job, error, out)) return false;
+  }
   const bool star = stars_cut(job, std::max(error, kFinestPanels), out), coarse = error >= kFinestPanels;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
-  const bool unsure = out.points.unsure[0] || out.points.unsure[1];  // of what a body loses that is not known to be convex
-  if (star && coarse && !small && !unsure && (out.points.point.empty() || meets(out, error))) return true;
+  if (star && coarse && !small && (out.points.point.empty() || meets(out, error))) return true;
   std::swap(kept_, out);
   out.summary.bodies = job.pair;
   if (!imprints_cut(job, out)) return false;
@@ -203,10 +210,9 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   return coarse || off <= kSafety * (kept_.summary.error_estimate + out.summary.error_estimate);
 }
 
-/// What the imprints of `third_bodies_` take of the patches, as in ContactSettings::error. @return nothing where that is not known, or more than `most`
-std::optional<double> PairSolver::taken_by_imprints(const Job& job, double most, const PairResult& out) {
-  constexpr double kSafety = 1.25;  // sizes are good to a tenth
-  double area = 0.0, force = 0.0;
+/// What the imprints of `third_bodies_` take of the patches. @return nothing where that is not known to the error asked
+std::optional<PairSolver::Taken> PairSolver::taken_by_imprints(const Job& job, const PairResult& out) {
+  Taken taken;
   for (const ContactBody* const third : third_bodies_) {
     if (!third->field.convex()) return std::nullopt;  // it may have several imprints on a patch
     for (const PolarCover& cover : patches_.covers()) {
@@ -214,31 +220,35 @@ std::optional<double> PairSolver::taken_by_imprints(const Job& job, double most,
       if (!inside) continue;
       const std::optional<ImprintSize> size = imprint_.measure(job.polar.pressure, cover, *third, *inside);
       if (!size) return std::nullopt;
-      area += kSafety * size->share;
-      force += kSafety * size->share * size->pressure * out.summary.area / out.load;
-      if (!(std::max(area, force) <= most)) return std::nullopt;
+      taken.area += size->share;
+      taken.force += size->share * size->pressure * out.summary.area / out.load;
+      if (!(kOfSize * taken.area <= job.settings().error)) return std::nullopt;
     }
   }
-  return std::max(area, force);
+  return taken;
 }
 
 /// Whether imprints are so small that the patches stay within the given error as they are, or solved a little finer. The estimate grows by what imprints take.
 bool PairSolver::may_leave_imprints(const Job& job, PairResult& out) {
-  constexpr double kMost = 0.8;  // of the error: finer patches cost more than cut ones
+  constexpr double kMost = 0.8;     // of the error: finer patches cost more than cut ones
+  constexpr double kSafety = 1.25;
   const double error = job.settings().error;
+  little_.reset();
   if (!(out.load > 0.0)) return false;
-  const std::optional<double> taken = taken_by_imprints(job, kMost * error, out);
-  if (!taken) return false;
-  if (out.summary.error_estimate + *taken > error) {
+  little_ = taken_by_imprints(job, out);
+  if (!little_) return false;
+  const double taken = kSafety * std::max(little_->area, little_->force);
+  if (!(taken <= kMost * error)) return false;
+  if (out.summary.error_estimate + taken > error) {
     out.clear();
-    if (!rings(job, error - *taken, out) || out.summary.error_estimate + *taken > error) {
+    if (!rings(job, error - taken, out) || out.summary.error_estimate + taken > error) {
       out.clear();
       rings(job, error, out);
       return false;
     }
     out.summary.rule = ContactRule::Polar;
   }
-  out.summary.error_estimate += *taken;
+  out.summary.error_estimate += taken;
   return true;
 }
 
@@ -332,7 +342,7 @@ bool PairSolver::stars_cut(const Job& job, double asked, PairResult& out) {
     }
     PanelOutcome outcome;
     const Vec3& origin = cover.frame.origin;
-    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, job.polar.regions, origin, job.settings().energy, false, &cover, imprints_, third_bodies_}, panel_room_, out.points, outcome)) return false;
+    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, job.polar.regions, origin, job.settings().energy, false, &cover, imprints_, apex_}, panel_room_, out.points, outcome)) return false;
     const PatchSums& sums = outcome.sums;
     out.add(sums, origin);
     share_.push_back({sums.force, sums.first + sums.load * origin, sums.load, sums.area, outcome.estimate});
@@ -462,7 +472,7 @@ void PairSolver::choose(const Job& job, PairResult& out) {
   if (fits && !patches_.empty()) {
     out.summary.rule = ContactRule::Polar;
     const Pressing pressing = third_.empty() ? Pressing::None : thirds_press(job, out);
-    cut_by_thirds_ = pressing == Pressing::None && !third_.empty() && job.settings().energy && thirds_press_beside(job, out);
+    cut_by_thirds_ = pressing == Pressing::None && !third_.empty() && fills_regions(job) && thirds_press_beside(job, out);
     if (pressing == Pressing::All) {
       fill_beyond_thirds(job, out);
       return;
@@ -499,7 +509,7 @@ void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
   const double error = region_error(job.settings());
   PatchPoints& points = out.points;
   const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, error);
-  const bool cut = job.settings().energy && cut_by_thirds_ && job.settings().error >= kAllFlow;
+  const bool cut = job.settings().energy && cut_by_thirds_;
   for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || cut || points.unsure[side]);
   if (points.point.empty() || !(points.unsure[0] || points.unsure[1])) return;
   take_all_thirds(job);
@@ -517,7 +527,7 @@ void PairSolver::fill_beyond_thirds(const Job& job, PairResult& out) {
   const Vec3 across = out.points.normal[peak];
   out.clear();
   out.summary.reason = RuleReason::ThirdBody;
-  if (!job.settings().energy || job.settings().error < kAllFlow) return;
+  if (!job.settings().energy) return;
   take_all_thirds(job);
   for (const int side : {0, 1}) {
     if (job.polar.regions[static_cast<std::size_t>(side)] == Region::None) continue;
@@ -560,6 +570,34 @@ void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> soft
     region_.fill({pressure, side, third_bodies_, region_error(job.settings()), equal}, job.overlap, Vec3::UnitZ(), out.points);
     out.summary.reason = RuleReason::Within;
     return;
+  }
+}
+
+/// What a convex body loses to several others flows out of one place of it through Sigma of all its pairs: such sides need no region. Obstacles lose to
+/// each other what they do not press hardest on, which no Sigma bounds.
+void PairSolver::find_apexes(Job& job, const Partners& partners) {
+  if (third_.empty()) return;
+  for (const std::size_t side : {0u, 1u}) {
+    if (job.polar.regions[side] != Region::Sums) continue;
+    const std::uint32_t body = side == 0 ? job.pair.a : job.pair.b, other = job.pair.a + job.pair.b - body;
+    const auto fixed = [&job](std::uint32_t c) { return job.bodies[c].fixed; };
+    if (fixed(body) && std::any_of(third_.begin(), third_.end(), fixed)) continue;
+    others_.clear();
+    for (const std::uint32_t c : partners.of(body)) others_.push_back(&job.bodies[c]);
+    std::size_t taker = 0;
+    apex_[side] = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, taker);
+    if (!apex_[side]) continue;
+    const std::uint32_t by = partners.of(body)[taker];
+    apex_[side]->lost = apex_[side]->lost && (by == other || (team_ != nullptr && fixed(other) && std::binary_search(team_->member.begin(), team_->member.end(), by)));
+    job.polar.regions[side] = Region::None;
+  }
+}
+
+void PairSolver::add_flows(const Job& job, PairResult& out) {
+  for (const std::size_t side : {0u, 1u}) {
+    if (!apex_[side] || (out.points.point.empty() && !apex_[side]->lost)) continue;
+    add_flow(job.polar.pressure, static_cast<int>(side), *apex_[side], job.settings().error, out.points);
+    if (out.points.point.empty()) out.summary.reason = RuleReason::Within;
   }
 }
 
@@ -606,12 +644,15 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
   job.polar.faces = convex && !job.polar.axis && is_finite(overlap);
   const bool equal = coincide(a, b);
   const std::optional<int> softer = equal ? std::nullopt : softer_of_nested_balls(a, b);
+  apex_ = {};
+  if (!equal) find_apexes(job, partners);
   if (!equal && !softer) {
     find_patches(job);
     choose(job, out);
     fill_unsure_regions(job, out);
   }
   fill_within(job, equal, softer, out);
+  add_flows(job, out);
 
   ContactSurface::Summary& summary = out.summary;
   summary.load = out.load;

@@ -2,7 +2,9 @@
 /// The contact surface of one pair: which rule fits, the polar one first.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -62,13 +64,22 @@ class PairSolver {
   enum class Pressing : std::uint8_t { None, Some, All };
   Pressing thirds_press(const Job& job, const PairResult& out);
   bool thirds_press_beside(const Job& job, const PairResult& out);
+  void find_apexes(Job& job, const Partners& partners);
+  void add_flows(const Job& job, PairResult& out);
+  [[nodiscard]] static bool fills_regions(const Job& job) {
+    return job.settings().energy && (job.polar.regions[0] != Region::None || job.polar.regions[1] != Region::None);
+  }
   void find_patches(const Job& job);
   bool rings(const Job& job, double error, PairResult& out);
   bool polar(const Job& job, PairResult& out);
   bool imprints_cut(const Job& job, PairResult& out);
   bool stars_cut(const Job& job, double asked, PairResult& out);
   bool polar_cut(const Job& job, PairResult& out);
-  std::optional<double> taken_by_imprints(const Job& job, double most, const PairResult& out);
+  /// What imprints take of the patches, over their area and force, to about a tenth: the latter at most.
+  struct Taken {
+    double area = 0.0, force = 0.0;
+  };
+  std::optional<Taken> taken_by_imprints(const Job& job, const PairResult& out);
   bool may_leave_imprints(const Job& job, PairResult& out);
   bool march(const Job& job, PairResult& out, bool alone = false);
   bool panels(const Job& job, PairResult& out);
@@ -107,7 +118,10 @@ class PairSolver {
   std::vector<Vec3> rim_;
   std::vector<std::uint8_t> taken_;  ///< of points and rims, 1: a third body presses harder
   PressureBatch beside_;
+  std::array<std::optional<Apex>, 2> apex_{};  ///< that what A, B lose to several bodies flows out of
+  std::vector<const ContactBody*> others_;
   bool cut_by_thirds_ = false;       ///< a third body may press harder on a part of Sigma, or of what the bodies lose
+  std::optional<Taken> little_;      ///< where that is little
   PairResult kept_;  ///< what another rule has left
 };
 

@@ -273,7 +273,10 @@ void solve_contact_surface(const StageContext& context, bool energy, Frame& fram
   settings.energy = energy;
   collision::solve_contact_surface(frame.bodies, frame.candidates, settings, context.executor, frame.surface);
   std::vector<std::uint8_t> touches(frame.bodies.size(), 0);
-  for (const auto& s : frame.surface.summary) touches[s.bodies.a] = touches[s.bodies.b] = 1;
+  for (const auto& s : frame.surface.summary) {
+    touches[s.bodies.a] = touches[s.bodies.b] = 1;
+    profile.evaluations += s.evaluations;
+  }
   frame.pressed.clear();
   for (std::uint32_t i = 0; i < touches.size(); ++i) {
     if (touches[i] != 0) frame.pressed.push_back(i);

@@ -1,6 +1,7 @@
 /// Stars: panels in angle and radius about a point that sees the rim of a patch, cut where third bodies press harder.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -54,12 +55,12 @@ TEST(PlaneChart, OfAStarReachesEverywhere) {
   for (int k = 0; k < 200; ++k) EXPECT_GT(chart.stretch({2.0 * std::numbers::pi * k / 200.0, 1.0}), 0.0) << k;
 }
 
-std::vector<ContactSurface::Summary> query(std::span<const ContactBody> bodies, double error) {
+std::vector<ContactSurface::Summary> query(std::span<const ContactBody> bodies, double error, bool energy = true) {
   const Executor executor(1);
   ContactCandidates candidates;
   ContactSurface surface;
   find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
-  solve_contact_surface(bodies, candidates, {.error = error}, executor, surface);
+  solve_contact_surface(bodies, candidates, {.error = error, .energy = energy}, executor, surface);
   return surface.summary;
 }
 
@@ -92,17 +93,63 @@ TEST(Star, CountsNoEnergyTwiceWhereAThirdBodyPressesBesideSigma) {
     Vec3 at;
   };
   const std::array balls{Ball{3.28, 0.395, Vec3(-0.084, 0.077, -0.098)}, Ball{1.99, 0.432, Vec3(0.063, 0.078, -0.194)}, Ball{2.56, 0.474, Vec3(0.001, 0.059, -0.127)}};
-  std::vector<benchmarks::Rigid> rigid;
-  rigid.reserve(balls.size());
-  std::vector<ContactBody> bodies;
-  for (const Ball& ball : balls) {
-    rigid.emplace_back(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), ball.support), ball.modulus, 0.05);
-    rigid.back().put({ball.at, Quat::Identity()});
-    bodies.push_back(rigid.back().body());
+  for (const bool convex : {true, false}) {  // as far as is known
+    std::vector<benchmarks::Rigid> rigid;
+    rigid.reserve(balls.size());
+    std::vector<testing::RadialField<testing::Wyvill>> field;
+    field.reserve(balls.size());
+    std::vector<ContactBody> bodies;
+    for (const Ball& ball : balls) {
+      rigid.emplace_back(benchmarks::wyvill_shape(implicit::ShapeKind::Point, Vec3::Zero(), ball.support), ball.modulus, 0.05);
+      rigid.back().put({ball.at, Quat::Identity()});
+      field.push_back({ball.at, {ball.support, 0.5}});
+      bodies.push_back(rigid.back().body());
+      if (!convex) bodies.back().field = field.back();
+    }
+    const benchmarks::LostVolumes exact = benchmarks::lost_volumes(bodies, 96);
+    const benchmarks::ContactsOfBodies found(bodies.size(), query(bodies, 1e-3));
+    EXPECT_NEAR(found.energy, exact.energy, 5e-3 * exact.energy) << convex;
   }
-  const benchmarks::LostVolumes exact = benchmarks::lost_volumes(bodies, 96);
-  const benchmarks::ContactsOfBodies found(bodies.size(), query(bodies, 1e-3));
-  EXPECT_NEAR(found.energy, exact.energy, 5e-3 * exact.energy);
+}
+
+/// Three equal balls. The third one reaches over the rim of the patch of the others, on a part that is long and narrow, and about as much as may be left.
+TEST(Star, LeavesNoMoreToAThirdBodyThanItsEstimateTells) {
+  std::vector<benchmarks::Rigid> rigid;
+  rigid.reserve(3);
+  for (int b = 0; b < 3; ++b) rigid.emplace_back(benchmarks::linear_sphere(1.0), benchmarks::kLinearModulus, 0.2);
+  for (const double deep : {0.05, 0.2}) {
+    const double rim = std::sqrt(deep - 0.25 * deep * deep);
+    rigid[0].put({Vec3(0.5 * deep - 1.0, 0, 0), Quat::Identity()});
+    rigid[1].put({Vec3(1.0 - 0.5 * deep, 0, 0), Quat::Identity()});
+    for (int i = 70; i < 130; i += 3) {
+      rigid[2].put({Vec3(0.03, 1.0 + rim * (1.0 - 0.3 * i / 400.0), 0.1), Quat::Identity()});
+      const std::vector<ContactBody> bodies{rigid[0].body(), rigid[1].body(), rigid[2].body()};
+      const ContactSurface::Summary s = query(bodies, 1e-2).at(0), fine = query(bodies, 1e-6).at(0);
+      EXPECT_LE(s.error_estimate, 1e-2) << i;
+      const double most = s.error_estimate + fine.error_estimate;
+      EXPECT_NEAR(s.area, fine.area, most * fine.area) << deep << ' ' << i;
+      EXPECT_LE((s.force - fine.force).norm(), most * fine.force.norm()) << deep << ' ' << i;
+    }
+  }
+}
+
+/// Pairs that go through each other have two patches. Without energies no columns tell of the second one.
+TEST(Star, HasTheForcesOfBodiesThatGoThroughEachOtherWithoutTheirEnergies) {
+  constexpr double kError = 1e-3;
+  for (const std::uint64_t seed : {5007u, 2026u, 2027u, 2028u}) {
+    const benchmarks::BodiesInOnePlace place(4, seed);
+    const std::vector<ContactBody> bodies = place.bodies();
+    for (std::size_t a = 0; a < bodies.size(); ++a) {
+      for (std::size_t b = a + 1; b < bodies.size(); ++b) {
+        const std::array pair{bodies[a], bodies[b]};
+        const auto with = query(pair, kError), without = query(pair, kError, false);
+        if (with.empty() || !(with.front().load > 0.0)) continue;
+        ASSERT_EQ(without.size(), 1u) << seed << ' ' << a << ' ' << b;
+        EXPECT_LE((with.front().force - without.front().force).norm(), 2.0 * kError * std::max(with.front().force.norm(), 1e-3 * with.front().load)) << seed << ' ' << a << ' ' << b;
+        EXPECT_NEAR(with.front().area, without.front().area, 2.0 * kError * with.front().area) << seed << ' ' << a << ' ' << b;
+      }
+    }
+  }
 }
 
 /// One of three, as one pair of them meets on a closed surface that lies in the third body.

@@ -346,6 +346,26 @@ ground: {height: 0, modulus: 1e9}
   EXPECT_LT(errors.at("position_m").get<double>(), 0.01);
 }
 
+TEST(StageErrors, CostAtMostATenthOfTheRunForEachStageBesideTheFirstOfEachKind) {
+  const nlohmann::json errors = errors_of(R"(
+schema: 1
+duration: 4 s
+frame_rate: 24
+gravity: [0, 0, -9.81]
+accuracy: 1e-2
+objects:
+  - name: blocks
+    particles: {arrange: grid, columns: 2, rows: 2, layers: 2, spacing: 0.09, at: [0, 0, 0.1], mass: 0.1, inertia_radius: 0.03}
+    separate: true
+    skeleton: [{shape: segment, half_length: 0.03, kernel: {type: wyvill, radius: 0.1}}]
+    contact: {modulus: 1e4, friction: 0.3, dissipation: 3}
+ground: {height: 0, friction: 0.5}
+)").at("errors");
+  EXPECT_GT(errors.at("contact").at("frames"), 1);
+  EXPECT_GT(errors.at("work").get<double>(), 0.02);
+  EXPECT_LT(errors.at("work").get<double>(), 0.25);  // 96 frames: the first ones are some of these
+}
+
 TEST(StageErrors, NameTheLargestAndWhatFrictionIsBlurredBy) {
   const nlohmann::json blurred = errors_of(ball("accuracy: 1e-2\nintegrator: {method: symplectic}\ntime_step: {substeps: 64}", 0.5));
   EXPECT_EQ(blurred.at("errors").at("largest"), "time");

@@ -70,7 +70,9 @@ struct ContactSurface {
     double area = 0.0;                     ///< [m^2]
     double load = 0.0;                     ///< integral of p dA [N]
     Vec3 centre_of_pressure = Vec3::Zero();  ///< integral x p dA / integral p dA [m]
-    double energy = 0.0;                   ///< integral of [min(p_A, p_B)]+ dV [J]; all pairs sum to that of all pressures but the largest
+    /// Integral of [min(p_A, p_B)]+ dV [J]; all pairs sum to that of all pressures but the largest. Beside third bodies it is the pair's share of that, which may
+    /// be less than 0; displaced volumes likewise.
+    double energy = 0.0;
     double largest_pressure = 0.0;         ///< at the peak; of faces on faces at the best of the points [Pa]
     double largest_overlap = 0.0;          ///< to first order without `ContactSettings::energy`: thickness of {p_A > 0, p_B > 0} through the point of largest pressure [m]
     double displaced_a = 0.0;              ///< volume of V_A [m^3]: what A loses to B

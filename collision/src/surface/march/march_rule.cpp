@@ -323,9 +323,9 @@ bool MarchRuleSolver::refine(PairPressure& pressure, Thirds third, const Limits&
 
 /// Ways through what one body loses: out of its apex, or along the interpolated normals, which fill the space beside Sigma without gaps as far as
 /// they do not meet.
-void MarchRuleSolver::start_columns(PairPressure& pressure, int side, Thirds third, const Node& peak) {
+void MarchRuleSolver::start_columns(PairPressure& pressure, int side, const Node& peak) {
   const double sign = side == 0 ? 1.0 : -1.0;
-  apex_ = find_apex(pressure, side, third, peak.point, sign * peak.normal);
+  apex_ = find_apex(pressure, side, peak.point, sign * peak.normal);
   columns_.assign(nodes_.size(), {});
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const Node& node = nodes_[i];
@@ -366,8 +366,8 @@ bool MarchRuleSolver::hold(PairPressure& pressure, int side) {
 }
 
 /// Gauss points in what one body loses, unless columns do not hold it.
-void MarchRuleSolver::add_columns(PairPressure& pressure, int side, Thirds third, double error, const Node& peak, PatchPoints& points) {
-  start_columns(pressure, side, third, peak);
+void MarchRuleSolver::add_columns(PairPressure& pressure, int side, double error, const Node& peak, PatchPoints& points) {
+  start_columns(pressure, side, peak);
   const std::size_t n = nodes_.size();
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
@@ -518,7 +518,7 @@ bool MarchRuleSolver::solve(const Job& job, PatchPoints& points) {
   }
   for (const int side : {0, 1}) {
     const Node& top = nodes_[peak];
-    if (job.regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, third, limits.error, top, points);
+    if (job.regions[static_cast<std::size_t>(side)] != Region::None) add_columns(pressure, side, limits.error, top, points);
     thickness_ += pressure.overlap_out_of(side, top.point, (side == 0 ? 1.0 : -1.0) * top.normal, cell_);
   }
   if (thickness_ > 0.0) estimate_ = std::min(1.0, estimate_ + 2.0 * rounding_error(coordinates, thickness_));

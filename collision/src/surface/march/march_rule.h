@@ -211,10 +211,10 @@ class MarchRuleSolver {
   static double share_of(const Leaf& leaf, int order);
   void weigh(int order);
   bool refine(PairPressure& pressure, Thirds third, const Limits& limits, const Vec3& reference);
-  void start_columns(PairPressure& pressure, int side, Thirds third, const Node& peak);
+  void start_columns(PairPressure& pressure, int side, const Node& peak);
   [[nodiscard]] bool lead_out() const;
   bool hold(PairPressure& pressure, int side);
-  void add_columns(PairPressure& pressure, int side, Thirds third, double error, const Node& peak, PatchPoints& points);
+  void add_columns(PairPressure& pressure, int side, double error, const Node& peak, PatchPoints& points);
 
   SigmaMesher mesher_;
   SigmaMesh mesh_;

@@ -616,10 +616,7 @@ bool PanelSolver::begin() {
     measure(0);
     return true;
   }
-  for (const std::size_t side : {0u, 1u}) {
-    if (job_.regions[side] == Region::None) continue;
-    setting_.apex[side] = find_apex(job_.pressure, static_cast<int>(side), job_.rival, job_.star->frame.origin, (side == 0 ? 1.0 : -1.0) * job_.star->frame.axis);
-  }
+  setting_.apex = job_.apex;
   for (double margin = kMargin; margin <= kWidest; margin *= kWider) {
     r_.arena.clear();
     r_.panel.clear();
@@ -644,15 +641,8 @@ bool PanelSolver::solve(PatchPoints& points, PanelOutcome& out) {
   const bool taken = star && out.estimate == 0.0 && !(all_.load > 0.0);
   if (!taken && (!(all_.load > 0.0) || (job_.graph_only && !has_one_sheet()))) return false;
   hand_over(points, out);
-  ColumnJob columns{job_.pressure, setting_.view.frame.axis[2], {}, setting_.order - (job_.energy ? 1 : 2), setting_.enough, setting_.view.reach, job_.regions, job_.error};
-  for (const std::size_t side : {0u, 1u}) {
-    if (!star || job_.regions[side] == Region::None) continue;
-    columns.apex[side] = setting_.apex[side];
-    if (columns.apex[side]) continue;
-    points.unsure[side] = true;
-    columns.regions[side] = Region::None;
-  }
-  add_columns(columns, r_.panel, r_.arena.point, points);
+  if (star) return true;
+  add_columns({job_.pressure, setting_.view.frame.axis[2], setting_.order - (job_.energy ? 1 : 2), setting_.enough, setting_.view.reach, job_.regions}, r_.panel, r_.arena.point, points);
   return true;
 }
 

@@ -33,7 +33,7 @@ struct PanelJob {
   bool graph_only;                    ///< fits only where Sigma seems to be one graph over a plane
   const PolarCover* star = nullptr;   ///< panels of a star about its origin, which holds one patch; or null: of the plane across the mean normal
   std::span<const ImprintPlace> imprint{};  ///< that may lie between nodes
-  Thirds rival{};  ///< the third bodies, where a star shares space with them
+  std::array<std::optional<Apex>, 2> apex{};  ///< that what A, B lose flows out of: what flows is held to the error, too
 };
 
 struct PanelOutcome {
@@ -71,16 +71,18 @@ bool solve_by_panels(const PanelJob& job, PanelRoom& room, PatchPoints& points, 
 struct ColumnJob {
   PairPressure& pressure;
   Vec3 way;            ///< of the columns, out of A into B [unit]
-  std::array<std::optional<Apex>, 2> apex;  ///< that those of A, of B come out of instead
   int order;           ///< Gauss points of a column
   double enough;       ///< of a step to a column's end [m]
   double reach;        ///< longest step that is believed [m]
   Regions regions;
-  double error;        ///< relative, of what a whole body has
 };
 
 /// The integral of p_A over V_A, of a body that every line along the way leaves once, is the flux through Sigma of way times the integral of p_A from
-/// there to where A ends, as the divergence of that is -p_A (Gauss); so is that of B along the opposite way. Columns out of an apex widen (Apex).
+/// there to where A ends, as the divergence of that is -p_A (Gauss); so is that of B along the opposite way.
 void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<const PanelPoint> sigma, PatchPoints& points);
+
+/// Adds to the sums of a side what flows out of an apex through the places of Sigma, and the whole body where the apex is lost.
+/// @param error  relative, of what the body has
+void add_flow(PairPressure& pressure, int side, const Apex& apex, double error, PatchPoints& points);
 
 }  // namespace supple::collision

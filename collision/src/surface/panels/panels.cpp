@@ -441,10 +441,16 @@ void Pass::make_pieces() {
 void Pass::add_flux(const Vec3& at, const SigmaRay& ray, double area, PatchSums& sums) const {
   for (const std::size_t side : {0u, 1u}) {
     const std::optional<Apex>& apex = s_.apex[side];
-    if (!apex || !(ray.pressure > 0.0) || !(ray.fall[side] > 0.0)) continue;
-    const double length = std::min(ray.pressure / ray.fall[side], s_.view.reach), wide = length / apex->distance(at);
-    const double flow = ray.normal.dot(apex->way(at)) * (side == 0 ? 1.0 : -1.0);
-    sums.flux[side] += area * flow * ray.pressure * length * (0.5 + wide * (1.0 / 3.0 + wide / 12.0));
+    if (!apex || !(ray.pressure > 0.0)) continue;
+    const Vec3 way = apex->way(at);
+    const double sign = side == 0 ? 1.0 : -1.0, fall = sign * ray.sense() * ray.fall[side];
+    double rate = way.dot(s_.view.frame.axis[ray.along]) * fall;  // at which the body's pressure falls along the way
+    for (const std::size_t k : {0u, 1u}) {
+      rate -= way.dot(s_.view.frame.axis[static_cast<std::size_t>(k == 0 ? first_across(ray.along) : second_across(ray.along))]) * (ray.slope[k] + fall * ray.rise[k]);
+    }
+    if (!(rate > 0.0)) continue;
+    const double length = ray.pressure / rate, wide = length / apex->distance(at);
+    sums.flux[side] += area * sign * ray.normal.dot(way) * ray.pressure * length * (0.5 + wide * (1.0 / 3.0 + wide / 12.0));
   }
 }
 

@@ -35,10 +35,12 @@ struct Swept {
 /// The same of a column out of an apex. @param flux  width where it leaves Sigma   @param bend  over the distance from the apex [1/m]
 [[nodiscard]] inline Swept swept_out_of_apex(double flux, double bend) { return {{flux, 2.0 * bend * flux, bend * bend * flux}}; }
 
-/// @param thirds  that take space from the pair, too: then the apex is the middle of the body, for all its pairs
-/// @param from  a place of Sigma   @param outward  its normal out of the body
-/// @return none of bodies that are not known to be convex
-[[nodiscard]] std::optional<Apex> find_apex(PairPressure& pressure, int side, Thirds thirds, const Vec3& from, const Vec3& outward);
+/// For a pair alone. @param from  a place of Sigma   @param outward  its normal out of the body   @return none of bodies that are not known to be convex
+[[nodiscard]] std::optional<Apex> find_apex(PairPressure& pressure, int side, const Vec3& from, const Vec3& outward);
+
+/// For all pairs of a body whose space several others take: far from all their Sigma. @param others  that the body meets, in one order for all its pairs
+/// @param taker  receives the place in `others` of the one that the apex is lost to, if it is   @return none of bodies that are not known to be convex
+[[nodiscard]] std::optional<Apex> find_shared_apex(PairPressure& pressure, int side, Thirds others, std::size_t& taker);
 
 /// Gauss points more along a column where it may go through most of the body.
 inline constexpr int kMoreAcross = 2;

@@ -322,7 +322,7 @@ std::optional<ImprintSize> ImprintFinder::measure(PairPressure& pressure, const 
   const Vec2 up = Vec2(centre.rise.x() / lu, centre.rise.y() / lv).normalized(), across(-up.y(), up.x());
   std::array<double, 2> half{1.0, 1.0};
   ImprintSize size;
-  for (const std::size_t n : {kAxes, kAround}) {
+  for (const std::size_t n : {kAxes, kAround, kAround}) {  // the first place may be so near to a rim that the imprint seems short across
     way_.clear();
     radius_.clear();
     for (std::size_t k = 0; k < n; ++k) {

@@ -346,11 +346,6 @@ bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const K
     const std::optional<implicit::CorePoint> core = pressure.field(side).core_point(frame.origin);
     may_go_through_ = may_go_through_ || ((!core || !core->round) && third.empty());
   }
-  for (const int side : {0, 1}) {
-    const bool wanted = !third.empty() && job.regions[static_cast<std::size_t>(side)] != Region::None;
-    apex_[side] = wanted ? find_apex(pressure, side, third, frame.origin, (side == 0 ? 1.0 : -1.0) * frame.axis) : std::nullopt;
-    if (apex_[side] && apex_[side]->lost) apex_[side].reset();  // ways out of it would lead against the axis
-  }
   const PatchPoints::Mark before = points.mark();
   const auto anew = [&] {
     points.back_to(before);

@@ -82,7 +82,7 @@ class PolarRuleSolver {
   // Columns through the squeezed regions: polar_columns.cpp.
   /// Cosine of a body's normal to the columns at the rim: nearer to grazing, they are long beside it.
   static constexpr double kUpright = 0.3;
-  /// The same of a ray, or of a way out of an apex, to what it is to meet: nearer to grazing, it is not followed.
+  /// The same of a ray to what it is to meet: nearer to grazing, it is not followed.
   static constexpr double kLeastSight = 0.1;
   /// Where finer rules may find the rim, over its distance as it is known.
   static constexpr double kBeyondRim = 1.2;
@@ -99,7 +99,6 @@ class PolarRuleSolver {
   bool comes_out(PairPressure& pressure, int side, Vec3 at);
   void evaluate_on_lines(PairPressure& pressure, int side);
   bool start_columns(int side);
-  bool start_out_of(const Apex& apex, double sign);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double placing_error() const;
   [[nodiscard]] double algebraic_error() const;
@@ -368,7 +367,6 @@ class PolarRuleSolver {
   };
 
   PeakFrame frame_;
-  std::array<std::optional<Apex>, 2> apex_;  // of each side, where third bodies take their part
   std::array<double, 2> spread_{};  // of the columns of each side, across over along [1/m], a metre from the axis
   std::array<double, 2> widest_{};  // the same at the rim [1]
   std::vector<Column> column_;  // by node, and that through the peak; one for all where they do not spread

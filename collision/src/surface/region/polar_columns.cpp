@@ -90,7 +90,6 @@ void PolarRuleSolver::evaluate_on_lines(PairPressure& pressure, int side) {
 bool PolarRuleSolver::start_columns(int side) {
   const std::size_t n = node_.size();
   const double sign = side == 0 ? 1.0 : -1.0, spread = spread_[side];
-  if (apex_[side] && start_out_of(*apex_[side], sign)) return true;
   column_.assign(spread == 0.0 ? 1 : n + 1, {sign * frame_.axis, {{1.0, 0.0, 0.0}}});
   if (spread == 0.0) return true;
   for (std::size_t i = 0; i <= n; ++i) {
@@ -100,20 +99,6 @@ bool PolarRuleSolver::start_columns(int side) {
     const double narrow = i < n ? 1.0 + sign * spread * normal_[i].dot(across) / normal_[i].dot(frame_.axis) : 1.0;
     if (!(narrow > 0.0)) return false;
     along.swept = {{narrow, spread * (1.0 + narrow), spread * spread}};
-  }
-  return true;
-}
-
-/// @return false where the rule's axis does not lead out of the apex
-bool PolarRuleSolver::start_out_of(const Apex& apex, double sign) {
-  const std::size_t n = node_.size();
-  column_.resize(n + 1);
-  for (std::size_t i = 0; i <= n; ++i) {
-    const Vec3 x = i < n ? node_.point[i] : peak_, way = apex.way(x), normal = i < n ? normal_[i] : frame_.axis;
-    const double along = sign * way.dot(frame_.axis);
-    if (!(along > kLeastSight)) return false;
-    const double flux = sign * normal.dot(way) / (along * normal.dot(frame_.axis)), bend = 1.0 / (along * apex.distance(x));
-    column_[i] = {way / along, swept_out_of_apex(flux, bend)};
   }
   return true;
 }
@@ -146,7 +131,6 @@ bool PolarRuleSolver::end_within(PairPressure& pressure, int side) {
 /// at whose end the pressure of the other body falls. @param ended  the columns are there; else lines along the axis
 bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended) {
   constexpr std::size_t kFew = 8;
-  constexpr int kSteps = 4;
   const std::size_t n = node_.size(), stride = (n + kFew - 1) / kFew;
   const Vec3 axis = (side == 0 ? 1.0 : -1.0) * frame_.axis;
   const auto way = [&](std::size_t i) { return ended ? column(i).way : axis; };
@@ -154,16 +138,22 @@ bool PolarRuleSolver::goes_through(PairPressure& pressure, int side, bool ended)
   for (std::size_t i = 0; i < n; i += stride) open_.push_back(i);
   open_.push_back(n);
   some_.resize(open_.size());
-  for (std::size_t k = 0; k < open_.size(); ++k) {
-    const std::size_t i = open_[k];
-    some_.point[k] = (i < n ? node_.point[i] : peak_) + (ended ? end_[side][i] : frame_.depth[side]) * way(i);
-  }
-  for (int step = 0; step < kSteps && !ended; ++step) {
+  std::vector<double> length, low(open_.size(), 0.0), high(open_.size(), kInfinity);
+  for (const std::size_t i : open_) length.push_back(ended ? end_[side][i] : frame_.depth[side]);
+  const auto place = [&] {
+    for (std::size_t k = 0; k < open_.size(); ++k) some_.point[k] = (open_[k] < n ? node_.point[open_[k]] : peak_) + length[k] * way(open_[k]);
+  };
+  place();
+  for (int step = 0; step < kFreeSteps && !ended; ++step) {
     pressure.evaluate(side, some_.point, some_.a, some_.slope_a);
     for (std::size_t k = 0; k < open_.size(); ++k) {
-      const double fall = -some_.slope_a[k].dot(axis);
-      some_.point[k] += (fall > 0.0 ? std::clamp(some_.a[k] / fall, -frame_.depth[side], frame_.depth[side]) : frame_.depth[side]) * axis;
+      (some_.a[k] > 0.0 ? low : high)[k] = length[k];
+      const double fall = -some_.slope_a[k].dot(axis), newton = length[k] + some_.a[k] / fall;
+      length[k] = fall > 0.0 && newton > low[k] && newton < high[k] ? std::min(newton, length[k] + frame_.depth[side])
+                  : std::isfinite(high[k])                          ? 0.5 * (low[k] + high[k])
+                                                                    : length[k] + frame_.depth[side];
     }
+    place();
   }
   pressure.evaluate(1 - side, some_.point, some_.b, some_.slope_b);
   for (std::size_t k = 0; k < open_.size(); ++k) {
@@ -203,11 +193,11 @@ bool PolarRuleSolver::add_columns(PairPressure& pressure, int nodes, int side, d
     return true;
   }
   if (!fits) return false;
-  if (spread_[side] > 0.0 || apex_[side]) nodes = kMostOnColumn;
+  if (spread_[side] > 0.0) nodes = kMostOnColumn;
   // The length is off by the square of the last step. From beyond the surface, where a kernel may change its formula, the slope is by as much as the place.
   const double inside = std::min(1e-3, 0.1 * std::sqrt(error));
   if (!column_ends(pressure, side, from_ends ? std::min(1e-3, error) : inside, inside)) return false;
-  if (!pressure.field(side).convex() && !apex_[side] && !end_within(pressure, side)) {
+  if (!pressure.field(side).convex() && !end_within(pressure, side)) {
     points.unsure[side] = true;
     thickness_ += frame_.depth[side];
     return true;

@@ -21,25 +21,30 @@ struct Column {
 
 /// The columns of a side, with a guess of their lengths. @return whether they are sure to hold what the body loses, as far as Sigma tells
 bool start_columns(const ColumnJob& job, std::size_t side, std::span<const Panel> panels, std::span<const PanelPoint> sigma, std::vector<Column>& columns) {
-  const std::optional<Apex>& apex = job.apex[side];
   const double sign = side == 0 ? 1.0 : -1.0;
   bool sure = true;
   columns.clear();
   for (const Panel& panel : panels) {
     for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
       const PanelPoint& p = sigma[i];
-      const Vec3 way = apex ? apex->way(p.at) : Vec3(sign * job.way);
+      const Vec3 way = sign * job.way;
       const double cosine = sign * p.normal.dot(way), fall = p.fall[side];
-      sure = sure && (apex || cosine > kLeastFall);
+      sure = sure && cosine > kLeastFall;
       const double guess = fall > 0.0 ? std::min(p.pressure / fall, job.reach) : job.reach;
-      columns.push_back({p.at, way, p.area * cosine, apex ? 1.0 / apex->distance(p.at) : 0.0, guess, 0.0, 0.0, false});
+      columns.push_back({p.at, way, p.area * cosine, 0.0, guess, 0.0, 0.0, false});
     }
   }
   return sure;
 }
 
+/// How ends of columns are looked for.
+struct Search {
+  double enough, reach;  // of a step; longest one that is believed [m]
+  double least_fall;     // cosine of the body's normal to a column
+};
+
 /// Newton's method along the columns for the zero of the body's pressure, safeguarded by halving. @return whether all end, and fall as they should there
-bool find_ends(const ColumnJob& job, int side, double least_fall, std::vector<Column>& columns) {
+bool find_ends(PairPressure& pressure, int side, const Search& search, std::vector<Column>& columns) {
   std::vector<std::size_t> open;
   std::vector<Vec3> point, slope;
   std::vector<double> value;
@@ -50,7 +55,7 @@ bool find_ends(const ColumnJob& job, int side, double least_fall, std::vector<Co
     for (const std::size_t i : open) point.push_back(columns[i].from + columns[i].length * columns[i].way);
     value.resize(point.size());
     slope.resize(point.size());
-    job.pressure.evaluate(side, point, value, slope);
+    pressure.evaluate(side, point, value, slope);
     std::size_t kept = 0;
     for (std::size_t n = 0; n < open.size(); ++n) {
       Column& column = columns[open[n]];
@@ -58,13 +63,13 @@ bool find_ends(const ColumnJob& job, int side, double least_fall, std::vector<Co
       const bool inside = value[n] > 0.0;
       (inside ? column.low : column.high) = column.length;
       column.high_seen = column.high_seen || !inside;
-      const double move = fall > 0.0 ? std::clamp(value[n] / fall, -job.reach, job.reach) : inside ? job.reach : -job.reach;
+      const double move = fall > 0.0 ? std::clamp(value[n] / fall, -search.reach, search.reach) : inside ? search.reach : -search.reach;
       double next = column.length + move;
-      if (next <= column.low || (column.high_seen && next >= column.high)) next = column.high_seen ? 0.5 * (column.low + column.high) : column.low + job.reach;
+      if (next <= column.low || (column.high_seen && next >= column.high)) next = column.high_seen ? 0.5 * (column.low + column.high) : column.low + search.reach;
       const double moved = std::abs(next - column.length);
       column.length = std::max(next, 0.0);
-      if (moved <= job.enough) {
-        lead_out = lead_out && fall >= least_fall * slope[n].norm();
+      if (moved <= search.enough) {
+        lead_out = lead_out && fall >= search.least_fall * slope[n].norm();
       } else {
         open[kept++] = open[n];
       }
@@ -92,20 +97,39 @@ void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<
   std::vector<double> value;
   for (const std::size_t side : {0u, 1u}) {
     if (job.regions[side] == Region::None) continue;
-    const std::optional<Apex>& apex = job.apex[side];
     const bool begun = start_columns(job, side, panels, sigma, columns);
-    const bool sure = find_ends(job, static_cast<int>(side), apex ? 0.0 : kLeastFall, columns) && begun;
+    const bool sure = find_ends(job.pressure, static_cast<int>(side), {job.enough, job.reach, kLeastFall}, columns) && begun;
     points.unsure[side] = points.unsure[side] || !sure;
     if (!sure) continue;
     const std::size_t begin = points.volume_point.size();
-    fill_columns(gauss_rule(apex ? job.order + kMoreAcross : job.order), columns, points);
-    if (apex && apex->lost) fill_body(job.pressure, static_cast<int>(side), apex->at, job.error, points.volume_point, points.volume_weight);
+    fill_columns(gauss_rule(job.order), columns, points);
     add_to_region(job.pressure, static_cast<int>(side), begin, value, points);
     if (job.regions[side] == Region::Points) continue;
     points.volume_point.resize(begin);
     points.volume_weight.resize(begin);
     points.volume_side.resize(begin);
   }
+}
+
+void add_flow(PairPressure& pressure, int side, const Apex& apex, double error, PatchPoints& points) {
+  constexpr double kEnough = 0.03;  // of a step, over the feature size and the root of the error: ends are off by its square
+  const double sign = side == 0 ? 1.0 : -1.0, reach = 0.5 * pressure.feature_size();
+  std::vector<Column> columns;
+  std::vector<double> value;
+  for (std::size_t i = 0; i < points.point.size(); ++i) {
+    const Vec3& at = points.point[i];
+    const Vec3 way = apex.way(at);
+    columns.push_back({at, way, sign * points.area[i] * points.normal[i].dot(way), 1.0 / apex.distance(at), reach, 0.0, 0.0, false});
+  }
+  find_ends(pressure, side, {kEnough * std::sqrt(error) * reach, reach, 0.0}, columns);
+  const std::size_t begin = points.volume_point.size();
+  // Columns may go through most of the body; two more digits ask for one more point.
+  fill_columns(gauss_rule(std::clamp(static_cast<int>(std::lround(5.0 - 0.5 * std::log10(error))), 6, 10)), columns, points);
+  if (apex.lost) fill_body(pressure, side, apex.at, error, points.volume_point, points.volume_weight);
+  add_to_region(pressure, side, begin, value, points);
+  points.volume_point.resize(begin);
+  points.volume_weight.resize(begin);
+  points.volume_side.resize(begin);
 }
 
 }  // namespace supple::collision

@@ -54,6 +54,7 @@ struct StageErrors {
   ErrorEstimate time;      ///< by the difference to steps twice as long, summed over the frames of a sample and scaled to all
   ErrorEstimate contact;   ///< likewise to a tenth of contact.error; of runs with an accuracy
   ErrorEstimate mesh;      ///< the error to which meshes are made
+  double work = 0.0;       ///< counted, of the frames that were simulated again, over that of the run
 };
 
 /// @param accuracy  in [1e-5, 4e-2]

@@ -55,6 +55,7 @@ struct StageProfile {
   std::uint64_t apart = 0;     ///< calls that stand for themselves
   std::uint64_t visited = 0;   ///< pairs, primitives, samples, blocks ... that were processed
   std::uint64_t present = 0;   ///< their total number
+  std::uint64_t evaluations = 0;  ///< of fields, for contact surfaces
   /// Adds a measured call; `scale` brings `cpu_s` up to date.
   void book(double seconds, bool stands_for_itself);
   void scale();

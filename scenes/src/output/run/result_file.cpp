@@ -60,6 +60,7 @@ ordered_json json_of(const Scene& scene, const StageErrors& errors) {
     largest = name;
   }
   json["largest"] = largest != nullptr ? ordered_json(largest) : ordered_json(nullptr);
+  json["work"] = errors.work;
   return json;
 }
 

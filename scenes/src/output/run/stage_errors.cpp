@@ -13,9 +13,17 @@ constexpr std::array<int, 2> kEvery{16, 6};  // one in so many frames is simulat
 constexpr int kEveryOfContact = 3;          // of these, with a finer contact.error, which costs several times as much
 constexpr double kFinerContact = 0.1;       // times contact.error
 constexpr double kFinestContact = 1e-10;    // smallest contact.error
+constexpr double kMostWork = 0.1;           // of that of the run, for each stage
 
 /// Contact points of all steps so far.
 std::uint64_t points_of(const Simulation& simulation) { return simulation.profile()[static_cast<std::size_t>(Stage::React)].visited; }
+
+/// Counted, so that what is sampled does not depend on the machine: what all stages have visited, and evaluations of fields.
+std::uint64_t work_of(const Simulation& simulation) {
+  std::uint64_t work = 0;
+  for (const StageProfile& stage : simulation.profile()) work += stage.visited + stage.evaluations;
+  return work;
+}
 
 double thread_cpu_seconds() {
   timespec now{};
@@ -35,6 +43,7 @@ StageErrorEstimator::StageErrorEstimator(const Scene& scene, const SimulationOpt
 void StageErrorEstimator::begin(const Simulation& simulation) {
   before_ = simulation.state();
   touched_ = points_of(simulation);
+  before_work_ = work_of(simulation);
 }
 
 void StageErrorEstimator::follow(const Simulation& simulation) {
@@ -53,19 +62,29 @@ void StageErrorEstimator::follow(const Simulation& simulation) {
 double StageErrorEstimator::end(const Simulation& simulation) {
   follow(simulation);
   kind_ = points_of(simulation) > touched_ ? 1 : 0;
-  const int seen = seen_[kind_]++;
-  if (seen % kEvery[kind_] != 0) return 0.0;
+  work_ = static_cast<double>(work_of(simulation) - before_work_);
+  all_work_ += work_;
   const double began = thread_cpu_seconds();
   const bool whole = simulation.state().halvings == 0;
-  const double error = contact_error(scene_);
+  const double error = contact_error(scene_), finer_contact = std::max(kFinestContact, kFinerContact * error);
+  Variant& time = whole ? finer_ : coarser_;
+  const int seen = seen_[kind_]++, sample = seen / kEvery[kind_];
+  if (seen % kEvery[kind_] == 0) {
+    time.due[kind_] = true;
+    // The first frames of a contact tell little.
+    contact_.due[kind_] = contact_.due[kind_] || (accuracy_of(scene_) && finer_contact < error && (sample == 0 || sample % kEveryOfContact == 1));
+  }
   // Of order p: steps twice as long err by 2^p e, half as long by 2^-p e.
   const double ratio = simulation.integrator().settings.method == core::Integrator::BackwardEuler ? 2.0 : 4.0;
-  compare(simulation, {whole ? 1 : -1, error, whole ? ratio / (ratio - 1.0) : 1.0 / (ratio - 1.0)}, whole ? finer_ : coarser_);
-  const double finer_contact = std::max(kFinestContact, kFinerContact * error);
-  // The first frames of a contact tell little.
-  const int sample = seen / kEvery[kind_];
-  if (accuracy_of(scene_) && finer_contact < error && (sample == 0 || sample % kEveryOfContact == 1)) compare(simulation, {0, finer_contact, 1.0}, contact_);
+  compare_if_due(simulation, {whole ? 1 : -1, error, whole ? ratio / (ratio - 1.0) : 1.0 / (ratio - 1.0)}, time);
+  compare_if_due(simulation, {0, finer_contact, 1.0}, contact_);
   return thread_cpu_seconds() - began;
+}
+
+void StageErrorEstimator::compare_if_due(const Simulation& simulation, const Change& change, Variant& variant) {
+  if (!variant.due[kind_] || (variant.frames[kind_] > 0 && variant.spent + variant.cost * work_ > kMostWork * all_work_)) return;
+  variant.due[kind_] = false;
+  compare(simulation, change, variant);
 }
 
 void StageErrorEstimator::compare(const Simulation& simulation, const Change& change, Variant& variant) {
@@ -80,7 +99,11 @@ void StageErrorEstimator::compare(const Simulation& simulation, const Change& ch
       for (auto& found : variant.found) found.resize(model.objects.size());
     }
     variant.simulation->restore(*before_);
+    const std::uint64_t begin = work_of(*variant.simulation);
     variant.simulation->step_frame();
+    const auto work = static_cast<double>(work_of(*variant.simulation) - begin);
+    if (work_ > 0.0) variant.cost = work / work_;
+    variant.spent += work;
   } catch (const Error&) {
     return;  // steps that are too long for this frame give no estimate
   }
@@ -137,7 +160,7 @@ ErrorEstimate StageErrorEstimator::estimate_of(std::initializer_list<const Varia
 }
 
 StageErrors StageErrorEstimator::estimate(const Model& model) const {
-  StageErrors out{.time = estimate_of({&coarser_, &finer_}, model), .contact = estimate_of({&contact_}, model), .mesh = {}};
+  StageErrors out{.time = estimate_of({&coarser_, &finer_}, model), .contact = estimate_of({&contact_}, model), .mesh = {}, .work = all_work_ > 0.0 ? (coarser_.spent + finer_.spent + contact_.spent) / all_work_ : 0.0};
   for (const ObjectModel& object : model.objects) {
     if (!object.mesh_error || *object.mesh_error / size_of(object) <= out.mesh.share) continue;
     out.mesh = {.position = *object.mesh_error, .share = *object.mesh_error / size_of(object), .object = object.name, .frames = 0};

@@ -1,6 +1,7 @@
 /// @file stage_errors.h
 /// Estimates the error of positions that each stage of a run causes. A sample of the frames with contact, and one of those without, is simulated again from
 /// the state before: with steps twice as long (half as long where a frame is one step) and, of scenes with an accuracy, given or by default, with a tenth of contact.error.
+/// But for the first of each kind, a frame for which the work on either of these would exceed a tenth of that of the run so far is passed over for the next one.
 #pragma once
 
 #include <array>
@@ -41,11 +42,16 @@ class StageErrorEstimator {
   };
   /// A second simulation, made when it is first needed, and the differences of its frames.
   struct Variant {
+    explicit Variant(double costs) : cost(costs) {}
+    double cost;                                                  ///< of its work on a frame, over that of the run: as expected, then of the last frame
+    double spent = 0.0;                                           ///< work on all frames
+    std::array<bool, 2> due{};                                    ///< by whether anything touches, as `frames`
     std::optional<Simulation> simulation;
     std::array<int, 2> frames{};                                  ///< by whether anything touched in them
     std::array<std::vector<std::vector<Difference>>, 2> found{};  ///< likewise, by object
   };
   void follow(const Simulation& simulation);
+  void compare_if_due(const Simulation& simulation, const Change& change, Variant& variant);
   /// Displacement at the end of the run by the difference of a frame [m].
   [[nodiscard]] double displacement(const Difference& found, std::size_t object) const;
   void compare(const Simulation& simulation, const Change& change, Variant& variant);
@@ -60,7 +66,9 @@ class StageErrorEstimator {
   std::uint64_t touched_ = 0;        ///< points of contact, before the frame
   std::size_t kind_ = 0;             ///< of the frame: whether anything touched
   std::array<int, 2> seen_{};        ///< frames, by that
-  Variant coarser_, finer_, contact_;
+  std::uint64_t before_work_ = 0;    ///< of the run, before the frame
+  double work_ = 0.0, all_work_ = 0.0;  ///< of the frame, of all frames
+  Variant coarser_{0.5}, finer_{2.0}, contact_{4.0};
 };
 
 }  // namespace supple::scenes
