@@ -58,7 +58,7 @@ std::vector<std::string> preview_overrides(const Scene& scene) {
   for (const char* key : {"mesh", "grid", "particles", "contacts", "samples"}) out.push_back("output." + std::string(key) + "=none");
   const std::vector<int> size = scene.output.images ? scene.output.images->size : ImagesDesc{}.size;
   out.push_back("output.images={size: [" + std::to_string(smaller(size.at(0))) + ", " + std::to_string(smaller(size.at(1))) + "], samples: 1}");
-  if (!scene.output.film) out.emplace_back("output.film=true");
+  if (!scene.output.film && scene.frame_count() > 1) out.emplace_back("output.film=true");
   out.emplace_back("render={renderer: gl}");  // without the keys of the path tracer
   out.push_back("contact.error=" + number_text(std::max(contact_error(scene), kContactError)));
   if (leaves_steps_open(scene)) out.push_back("accuracy=" + number_text(kAccuracy));
