@@ -22,13 +22,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
+std::vector<std::string> preview_of(const Scene& scene) { return preview_overrides(scene, build_model(scene)); }
+
 const std::string kScene = std::string(small::kTwoDrops) + "duration: 1 s\noutput: {images: {size: [320, 200]}, mesh: ply, particles: csv}\n";
 
 using Words = std::vector<std::string>;
 
 TEST(Preview, IsSmallerAndCoarser) {
   const Scene whole = parse_scene(kScene, "drops.yaml", ".");
-  const Scene small = parse_scene(kScene, "drops.yaml", ".", preview_overrides(whole));
+  const Scene small = parse_scene(kScene, "drops.yaml", ".", preview_of(whole));
   EXPECT_EQ(small.output.images->size, (std::vector<int>{80, 50}));
   EXPECT_EQ(small.output.images->samples, 1);
   EXPECT_TRUE(small.output.mesh.empty());
@@ -41,15 +43,15 @@ TEST(Preview, IsSmallerAndCoarser) {
 
 TEST(Preview, KeepsStepsThatTheSceneFixes) {
   const std::string text = kScene + "time_step: {substeps: 64}\n";
-  EXPECT_FALSE(parse_scene(text, "drops.yaml", ".", preview_overrides(parse_scene(text, "drops.yaml", "."))).accuracy.has_value());
+  EXPECT_FALSE(parse_scene(text, "drops.yaml", ".", preview_of(parse_scene(text, "drops.yaml", "."))).accuracy.has_value());
   const std::string fine = kScene + "accuracy: 1e-4\n";
-  EXPECT_EQ(parse_scene(fine, "drops.yaml", ".", preview_overrides(parse_scene(fine, "drops.yaml", "."))).accuracy, 4e-2);
+  EXPECT_EQ(parse_scene(fine, "drops.yaml", ".", preview_of(parse_scene(fine, "drops.yaml", "."))).accuracy, 4e-2);
 }
 
 TEST(Preview, ShowsFewerFramesOfAFilmWithMany) {
   const auto previewed = [](std::vector<std::string> set) {
     const Scene whole = parse_scene(kScene, "drops.yaml", ".", set);
-    const std::vector<std::string> smaller = preview_overrides(whole);
+    const std::vector<std::string> smaller = preview_of(whole);
     set.insert(set.end(), smaller.begin(), smaller.end());
     return std::pair(preview_stride(whole), parse_scene(kScene, "drops.yaml", ".", set));
   };
@@ -72,14 +74,14 @@ TEST(Preview, ShowsFewerFramesOfAFilmWithMany) {
 
 TEST(Preview, TakesFewerSamplesToFindContacts) {
   const Scene whole = read_scene(source_dir() / "scenes/library/contacts/slide_on_incline.yaml");
-  const Scene small = read_scene(whole.source, preview_overrides(whole));
+  const Scene small = read_scene(whole.source, preview_of(whole));
   EXPECT_NEAR(build_model(small).objects[0].sample_spacing, 2.0 * build_model(whole).objects[0].sample_spacing, 1e-12);
 }
 
 TEST(Preview, OfAStillHasNoFilm) {
   const Scene still = parse_scene(kScene, "drops.yaml", ".", Words{"duration=1 ms"});
   ASSERT_EQ(still.frame_count(), 1);
-  std::vector<std::string> set = preview_overrides(still);
+  std::vector<std::string> set = preview_of(still);
   set.insert(set.begin(), "duration=1 ms");
   EXPECT_FALSE(parse_scene(kScene, "drops.yaml", ".", set).output.film.has_value());
 }
@@ -111,7 +113,7 @@ TEST(Preview, IsThereOfEverySceneOfTheLibrary) {
   for (const auto& entry : fs::recursive_directory_iterator(source_dir() / "scenes/library")) {
     if (entry.path().extension() != ".yaml") continue;
     const Scene whole = read_scene(entry.path());
-    const Scene small = read_scene(entry.path(), preview_overrides(whole));
+    const Scene small = read_scene(entry.path(), preview_of(whole));
     EXPECT_EQ(small.render.renderer, RendererName::Gl) << entry.path();
     EXPECT_GE(small.frame_count(), std::min(whole.frame_count(), 10)) << entry.path();
   }
