@@ -167,7 +167,7 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.simulate_only = arguments.simulate_only;
   options.no_pictures = arguments.no_pictures;
   options.profile = arguments.profile;
-  options.estimate_errors = options.contact_sheet = !arguments.preview;
+  options.estimate_errors = options.contact_sheet = options.divide = !arguments.preview;
   options.context = arguments.context;
   options.frames_at_once = arguments.at_once;
   options.memory = arguments.memory;

@@ -86,6 +86,20 @@ TEST(Preview, OfAStillHasNoFilm) {
   EXPECT_FALSE(parse_scene(kScene, "drops.yaml", ".", set).output.film.has_value());
 }
 
+TEST(Preview, LeavesBodiesWholeWhereTheyTouchUnlessTheyBulge) {
+  const auto length_of = [](bool divide, const Words& set) {  // of the left drop, along the line between the middles, over its width
+    Simulation simulation(parse_scene(kScene, "drops.yaml", ".", set), {.divide = divide});
+    while (simulation.frame() < 3) simulation.step_frame();
+    EXPECT_FALSE(simulation.contacts().summary.empty());
+    Box box;
+    for (const Vec3& p : simulation.meshes()[0].position) box.include(p);
+    return box.extent().x() / box.extent().z();
+  };
+  EXPECT_NEAR(length_of(false, {}), 1.0, 5e-3);  // a ball
+  EXPECT_LT(length_of(true, {}), 0.99);          // cut where it touches
+  EXPECT_LT(length_of(false, {"contact.bulge=0.4"}), 0.99);
+}
+
 TEST(Preview, DoesWithoutAContactSheet) {
   const fs::path folder = temp_folder() / "sheets";
   const Scene scene = parse_scene(kScene, "drops.yaml", ".", Words{"duration=0.2 s", "output={images: {size: [64, 40], samples: 1}}"});

@@ -276,7 +276,7 @@ RunEstimate estimate_run(const Scene& scene, const RunOptions& options, double f
   outputs.film = outputs.film && outputs.images && (options.frames.empty() || (*options.frames.begin() == 1 && *options.frames.rbegin() == static_cast<int>(options.frames.size())));
   if (outputs.film) render::find_film_program();
   const SimulationOptions simulation_options{.threads = options.threads, .skip = options.skip, .delaunay = options.delaunay,
-                                             .interrupt = options.interrupt, .memory = options.scene_memory};
+                                             .interrupt = options.interrupt, .memory = options.scene_memory, .divide = options.divide};
   const int last = options.frames.empty() ? scene.frame_count() : std::min(scene.frame_count(), *options.frames.rbegin());
   const Coarse coarse = follow(scene, simulation_options, last, follow_s);
   const ScratchFolder scratch;

@@ -124,7 +124,8 @@ void DrawingCrew::begin(Member& member) {
   try {
     const InterruptScope scope(options_.interrupt);
     std::unique_lock lock(opening_);
-    Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay, options_.interrupt, options_.scene_memory});
+    Simulation simulation(scene_, SimulationOptions{.threads = options_.threads, .skip = options_.skip, .profile = options_.profile, .delaunay = options_.delaunay,
+                                                    .interrupt = options_.interrupt, .memory = options_.scene_memory, .divide = options_.divide});
     FrameWriter writer(scene_, simulation.model(), options_, outputs_);
     lock.unlock();
     work(simulation, writer);

@@ -69,7 +69,7 @@ void add_blurred_friction(const Scene& scene, const Simulation& simulation, std:
 
 SimulationOptions simulation_options(const RunOptions& options) {
   return {.threads = options.threads, .skip = options.skip, .profile = options.profile, .delaunay = options.delaunay, .interrupt = options.interrupt,
-          .memory = options.scene_memory};
+          .memory = options.scene_memory, .divide = options.divide};
 }
 
 /// A run whose estimated error exceeds the accuracy of the scene names the stage with the largest error.
