@@ -19,8 +19,10 @@ ball_on_mesh|24|Balls roll off a block from a mesh file
 bounces|14|A ball bounces lower and lower
 newtons_cradle|20|The last ball leaves with the speed of the first
 press_and_belt|30|A press squeezes a ball on a belt
-slide_on_incline|6|Friction holds one table and lets another slide
-looks|4|Looks of surfaces
+spiral_three_balls|24|Three balls hit a spiral at once
+worm_curls_up|40|A worm curls up and touches itself
+slide_on_incline|14|Friction holds one table and lets another slide
+looks|8|Looks of surfaces: textures, metal, a wireframe, pressure in colours
 blending|1|Ways to blend
 kernels|1|Field functions
 primitives|1|Skeleton shapes

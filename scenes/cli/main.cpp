@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <iostream>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <sstream>
@@ -35,6 +36,7 @@
 #include "supple/scenes/inspect.h"
 #include "supple/scenes/job.h"
 #include "supple/scenes/limits.h"
+#include "supple/scenes/model.h"
 #include "supple/scenes/preview.h"
 #include "supple/scenes/query.h"
 #include "supple/scenes/read_scene.h"
@@ -165,7 +167,7 @@ scenes::RunOptions run_options(const Arguments& arguments, const fs::path& folde
   options.simulate_only = arguments.simulate_only;
   options.no_pictures = arguments.no_pictures;
   options.profile = arguments.profile;
-  options.estimate_errors = !arguments.preview;
+  options.estimate_errors = options.contact_sheet = options.divide = !arguments.preview;
   options.context = arguments.context;
   options.frames_at_once = arguments.at_once;
   options.memory = arguments.memory;
@@ -193,6 +195,7 @@ tool::ProgressBar make_bar(const Arguments& arguments) {
 struct SceneToRun {
   scenes::Scene scene;
   int stride = 1;
+  std::shared_ptr<const scenes::Model> whole{};  ///< of the scene that a preview shows: solids of meshes that it has are not made again
 };
 
 SceneToRun read_for_run(const Arguments& arguments) {
@@ -200,9 +203,10 @@ SceneToRun read_for_run(const Arguments& arguments) {
     scenes::Scene scene = scenes::read_scene(arguments.scene, arguments.set, arguments.allowed);
     if (!arguments.fingerprint.empty()) scenes::expect_fingerprint(scene, arguments.fingerprint);
     if (!arguments.preview) return {.scene = std::move(scene)};
-    std::vector<std::string> set = scenes::preview_overrides(scene);
+    auto whole = std::make_shared<const scenes::Model>(scenes::build_model(scene));
+    std::vector<std::string> set = scenes::preview_overrides(scene, *whole);
     set.insert(set.begin(), arguments.set.begin(), arguments.set.end());
-    return {.scene = scenes::read_scene(arguments.scene, set, arguments.allowed), .stride = scenes::preview_stride(scene)};
+    return {.scene = scenes::read_scene(arguments.scene, set, arguments.allowed), .stride = scenes::preview_stride(scene), .whole = std::move(whole)};
   } catch (const Error& error) {
     if (arguments.dry_run) throw;  // it leaves no files
     const std::string name = fs::path(arguments.scene).stem().string();
@@ -219,7 +223,7 @@ std::set<int> frames_of_preview(const std::set<int>& frames, int stride) {
 }
 
 int run(const Arguments& arguments) {
-  const auto [scene, stride] = read_for_run(arguments);
+  const auto [scene, stride, whole] = read_for_run(arguments);
   tool::ProgressBar bar = make_bar(arguments);
   if (arguments.dry_run) {
     scenes::RunOptions options = run_options(arguments, {}, bar);

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
+#include <utility>
+#include <vector>
 
 #include "field/single_part.h"
 #include "solids/mesh_distance.h"
@@ -30,12 +33,34 @@ Mesh flat_faces(const ClosedSurface& surface, const Pose& pose) {
   return flat;
 }
 
+bool equal(const ClosedSurface& a, const ClosedSurface& b) {
+  // What crosses is cut into pieces: those of different meshes may be the same.
+  return a.crossing_before == 0 && b.crossing_before == 0 && a.turned == b.turned && a.position == b.position && a.triangle == b.triangle;
+}
+
+/// Solids of one mesh share its distance as long as one of them lives: every simulation of a run has the solids of its scene.
+std::shared_ptr<const MeshDistance> distance_to(ClosedSurface surface) {
+  static std::mutex mutex;
+  static std::vector<std::weak_ptr<const MeshDistance>> alive;
+  {
+    const std::lock_guard lock(mutex);
+    std::erase_if(alive, [](const auto& one) { return one.expired(); });
+    for (const auto& one : alive) {
+      if (auto distance = one.lock(); distance && equal(distance->exact().surface(), surface)) return distance;
+    }
+  }
+  auto made = std::make_shared<const MeshDistance>(std::move(surface));
+  const std::lock_guard lock(mutex);
+  alive.push_back(made);
+  return made;
+}
+
 }  // namespace
 
 MeshSolid::MeshSolid(const Mesh& mesh, const MeshSolidOptions& options)
     : position_(options.pose.position), rotation_(options.pose.orientation.toRotationMatrix()), slope_(options.slope) {
   SUPPLE_EXPECTS(options.slope > 0.0);
-  distance_ = std::make_shared<const MeshDistance>(closed_surface(mesh));
+  distance_ = distance_to(closed_surface(mesh));
   const ClosedSurface& surface = distance_->exact().surface();
   mesh_ = std::make_shared<const Mesh>(flat_faces(surface, options.pose));
   const Box inside = distance_->inside_box();

@@ -76,6 +76,8 @@ void Simulation::Impl::pull_fields() {
 const Division& Simulation::Impl::pull_division() {
   pull_fields();
   if (division) return *division;
+  const bool bulges = model.bulge.attenuation > 0.0 || model.bulge.keep_volume;
+  if (!options.divide && !bulges) return division.emplace();
   division = division_of(model, bodies, pulled.field, pulled.bodies, pulled.surface, executor);
   SearchCounts found;
   found.short_bulges = find_short_bulges(model, bodies, *division, time());

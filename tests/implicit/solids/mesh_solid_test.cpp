@@ -63,9 +63,12 @@ TEST(MeshSolid, IsTheSameInAnyUnitOfLength) {
 TEST(MeshSolid, IsTheSameInAnyOrderOfQuestionsByAnyThreads) {
   const Mesh mesh = gear(24, 0.4, 0.5, 0.1);
   const std::vector<Vec3> asked = places({Vec3::Constant(-0.6), Vec3::Constant(0.6)}, 2000);
-  const MeshSolid solid(mesh, {.slope = 1.0}), other(mesh, {.slope = 1.0});
   std::vector<double> expected;
-  for (const Vec3& x : asked) expected.push_back(value(solid, x));
+  {
+    const MeshSolid solid(mesh, {.slope = 1.0});
+    for (const Vec3& x : asked) expected.push_back(value(solid, x));
+  }
+  const MeshSolid other(mesh, {.slope = 1.0});  // with a distance of its own, as the other one is gone
   std::vector<std::vector<double>> found(4, std::vector<double>(asked.size()));
   std::vector<std::thread> threads;
   for (std::vector<double>& own : found) {
@@ -75,6 +78,13 @@ TEST(MeshSolid, IsTheSameInAnyOrderOfQuestionsByAnyThreads) {
   }
   for (std::thread& thread : threads) thread.join();
   for (const std::vector<double>& own : found) EXPECT_EQ(own, expected);
+}
+
+TEST(MeshSolid, SharesTheDistanceOfEqualMeshes) {
+  const Mesh mesh = gear(24, 0.4, 0.5, 0.1);
+  const MeshSolid solid(mesh, {.slope = 1.0}), moved(mesh, {.slope = 2.0, .pose = {Vec3(1, 2, 3), kTurn}}), other(gear(25, 0.4, 0.5, 0.1), {.slope = 1.0});
+  EXPECT_TRUE(share_distance(solid, moved));
+  EXPECT_FALSE(share_distance(solid, other));
 }
 
 TEST(MeshSolid, IsExactBesideFlatFaces) {

@@ -46,6 +46,8 @@ class MeshSolid {
   /// Its boundary triangles, with the normal of each face at its corners.
   [[nodiscard]] const Mesh& mesh() const { return *mesh_; }
   [[nodiscard]] const Report& report() const { return report_; }
+  /// Whether they are of one mesh, in whatever pose, and keep its distances together. Solids of equal meshes without crossings do while both live.
+  [[nodiscard]] friend bool share_distance(const MeshSolid& a, const MeshSolid& b) { return a.distance_ == b.distance_; }
 
  private:
   double evaluate(const Vec3& point, Vec3* gradient) const;

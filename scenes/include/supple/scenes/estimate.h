@@ -21,11 +21,13 @@ struct RunEstimate {
   double disk = 0.0;          ///< of all files [byte]
   double simulation_s = 0.0;  ///< CPU time of steps, with those of the error estimate [s]
   double drawing_s = 0.0;     ///< CPU time of meshes, pictures and other files [s]
+  double film_s = 0.0;        ///< CPU time of the program that encodes the film [s]
   double wall_s = 0.0;        ///< with the threads of the options, on an idle machine [s]
 };
 
 /// Follows the scene with coarse contact to its end, or as long as `follow_s`, and makes a sample of frames from its states in full, outputs included, in a folder
-/// that is removed. CPU times of the sample over those of the same coarse frames scale the time of all coarse frames.
+/// that is removed. CPU times of the sample over those of the same coarse frames scale the time of all coarse frames. Frames in which bodies touch and the others are
+/// counted apart: their meshes differ.
 /// @param options  frames, threads, limits and components of the run; its folder is not touched
 /// @param follow_s  CPU time of the coarse simulation [s]
 /// @throws as `run_scene`

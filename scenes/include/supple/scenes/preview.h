@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "supple/scenes/model.h"
 #include "supple/scenes/scene.h"
 
 namespace supple::scenes {
@@ -14,9 +15,9 @@ namespace supple::scenes {
 [[nodiscard]] int preview_stride(const Scene& scene);
 
 /// Overrides as of `--set` with which the scene is read again as its preview: pictures of a quarter of the size with one sample a pixel by OpenGL,
-/// lattice cells three times as long, contact.error 0.1, accuracy 4e-2 where the scene leaves its steps open; every `preview_stride`-th frame; no other
-/// files. Times and cameras stay.
-/// @throws as `build_model`, which gives the lattice cells
-[[nodiscard]] std::vector<std::string> preview_overrides(const Scene& scene);
+/// lattice cells three times as long, contact.error 0.1, accuracy 4e-2 where the scene leaves its steps open; every `preview_stride`-th frame; a film
+/// where there is more than one; no other files. Times and cameras stay.
+/// @param model  of the scene; gives the lattice cells
+[[nodiscard]] std::vector<std::string> preview_overrides(const Scene& scene, const Model& model);
 
 }  // namespace supple::scenes

@@ -47,6 +47,8 @@ struct RunOptions {
   bool skip = true;                             ///< see SimulationOptions::skip
   bool profile = false;
   bool estimate_errors = true;                  ///< simulate a sample of frames again, more accurately, for RunResult::errors
+  bool divide = true;                           ///< see SimulationOptions::divide
+  bool contact_sheet = true;                    ///< make the sheet of twelve pictures, too
   bool no_pictures = false;                     ///< no images and no film, which `render_run` makes of the saved states
   implicit::DelaunayMesher delaunay{};          ///< see SimulationOptions::delaunay
   std::string context = "auto";                 ///< auto, osmesa or egl

@@ -39,6 +39,7 @@ struct SimulationOptions {
   const std::atomic<int>* interrupt = nullptr;  ///< not 0: long calls throw Interrupted; see InterruptScope (core/interrupt.h)
   double memory = kDefaultMemory;  ///< limit of memory for the scene, by the counts made before it is built [byte]
   int finer = 0;               ///< steps are halved this many more times; negative: fewer times, but at most one step per frame
+  bool divide = true;          ///< false: of bodies that do not bulge the meshes are whole where they touch, too, and overlap there: they look the same from outside, and cost less
   bool questions = false;      ///< for queries of states: an initial state that needs finer steps than time_step.max_substeps is refused by the first step, not earlier
 };
 

@@ -297,7 +297,7 @@ fs::path FrameWriter::finish(Simulation& simulation, Reporter& report, int last)
 /// The contact sheet, and the film if all frames are there in one look. An earlier film that shows others does not stay.
 fs::path FrameWriter::make_film(const std::string& name, int last) {
   const FrameLooks looks = look_at_frames(options_.folder, name, last);
-  write_contact_sheet(options_.folder, name, looks);
+  if (options_.contact_sheet) write_contact_sheet(options_.folder, name, looks);
   const std::string why_not = describe_looks(looks, name);
   if (outputs_.film && why_not.empty()) {
     const fs::path film = options_.folder / (name + ".mp4");

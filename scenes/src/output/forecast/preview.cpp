@@ -4,7 +4,6 @@
 
 #include "file/read_scene_faults.h"
 #include "supple/scenes/accuracy.h"
-#include "supple/scenes/model.h"
 
 namespace supple::scenes {
 namespace {
@@ -31,8 +30,7 @@ void add_frame_rate(const Scene& scene, std::vector<std::string>& out) {
   if (scene.time_step.substeps && !scene.time_step.size) out.push_back("time_step.substeps=" + substeps(*scene.time_step.substeps));
 }
 
-void add_meshing(const Scene& scene, std::vector<std::string>& out) {
-  const Model model = build_model(scene);
+void add_meshing(const Scene& scene, const Model& model, std::vector<std::string>& out) {
   if (!(model.cell > 0.0)) return;
   out.push_back("output.cell=" + number_text(kCoarserCell * model.cell));
   out.emplace_back("output.meshing={search: false}");
@@ -53,17 +51,17 @@ int preview_stride(const Scene& scene) {
   return every;
 }
 
-std::vector<std::string> preview_overrides(const Scene& scene) {
+std::vector<std::string> preview_overrides(const Scene& scene, const Model& model) {
   std::vector<std::string> out;
   for (const char* key : {"mesh", "grid", "particles", "contacts", "samples"}) out.push_back("output." + std::string(key) + "=none");
   const std::vector<int> size = scene.output.images ? scene.output.images->size : ImagesDesc{}.size;
   out.push_back("output.images={size: [" + std::to_string(smaller(size.at(0))) + ", " + std::to_string(smaller(size.at(1))) + "], samples: 1}");
-  if (!scene.output.film) out.emplace_back("output.film=true");
+  if (!scene.output.film && scene.frame_count() > 1) out.emplace_back("output.film=true");
   out.emplace_back("render={renderer: gl}");  // without the keys of the path tracer
   out.push_back("contact.error=" + number_text(std::max(contact_error(scene), kContactError)));
   if (leaves_steps_open(scene)) out.push_back("accuracy=" + number_text(kAccuracy));
   add_frame_rate(scene, out);
-  add_meshing(scene, out);
+  add_meshing(scene, model, out);
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "output/files/saved_frames.h"
+#include "output/pictures/camera.h"
 #include "supple/core/cpu_time.h"
 #include "supple/core/executor.h"
 #include "supple/core/interrupt.h"
@@ -22,6 +23,16 @@ double cpu_seconds(const Profile& profile) {
   return std::accumulate(profile.begin(), profile.end(), 0.0, [](double sum, const StageProfile& stage) { return sum + stage.cpu_s; });
 }
 
+/// OpenGL contexts among which these pictures are worth dividing.
+int worthwhile_contexts(const Scene& scene, std::size_t frames) {
+  constexpr int kMost = 64;
+  constexpr double kPixelsOfContext = 4e5;  // drawn in the time that a context and its shaders take
+  if (scene.render.renderer != RendererName::Gl) return kMost;
+  const std::vector<int> size = scene.output.images ? scene.output.images->size : ImagesDesc{}.size;
+  const double pixels = static_cast<double>(size.at(0)) * size.at(1) * static_cast<double>(cameras_of(scene).size() * frames);
+  return static_cast<int>(std::clamp(pixels / kPixelsOfContext, 1.0, static_cast<double>(kMost)));
+}
+
 }  // namespace
 
 double resident_bytes() {
@@ -31,10 +42,10 @@ double resident_bytes() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-int crew_size(const RunOptions& options, std::size_t frames, double share) {
+int crew_size(const Scene& scene, const RunOptions& options, std::size_t frames, double share) {
   if (options.profile) return 1;
-  const int most = std::min<int>(static_cast<int>(std::min<std::size_t>(frames, 64)),
-                                 options.frames_at_once > 0 ? options.frames_at_once : Executor(options.threads).threads());
+  const int wanted = options.frames_at_once > 0 ? options.frames_at_once : std::min(Executor(options.threads).threads(), worthwhile_contexts(scene, frames));
+  const int most = std::min<int>(static_cast<int>(std::min<std::size_t>(frames, 64)), wanted);
   const double memory = options.memory > 0.0 ? options.memory : 0.5 * free_bytes();
   const double room = share > 0.0 ? memory / share : most;
   return std::max(1, static_cast<int>(std::min<double>(most, room)));
@@ -113,7 +124,8 @@ void DrawingCrew::begin(Member& member) {
   try {
     const InterruptScope scope(options_.interrupt);
     std::unique_lock lock(opening_);
-    Simulation simulation(scene_, SimulationOptions{options_.threads, options_.skip, options_.profile, options_.delaunay, options_.interrupt, options_.scene_memory});
+    Simulation simulation(scene_, SimulationOptions{.threads = options_.threads, .skip = options_.skip, .profile = options_.profile, .delaunay = options_.delaunay,
+                                                    .interrupt = options_.interrupt, .memory = options_.scene_memory, .divide = options_.divide});
     FrameWriter writer(scene_, simulation.model(), options_, outputs_);
     lock.unlock();
     work(simulation, writer);

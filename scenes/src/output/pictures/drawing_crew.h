@@ -17,8 +17,9 @@ namespace supple::scenes {
 
 /// Memory of this process [byte].
 [[nodiscard]] double resident_bytes();
-/// Number of frames to draw at the same time when each needs `share` bytes; one where times are measured exactly.
-[[nodiscard]] int crew_size(const RunOptions& options, std::size_t frames, double share);
+/// Number of frames to draw at the same time when each needs `share` bytes; one where times are measured exactly, and where there is so little to draw that
+/// another OpenGL context takes longer than it saves.
+[[nodiscard]] int crew_size(const Scene& scene, const RunOptions& options, std::size_t frames, double share);
 
 /// Each member has its own simulation and renderer, so that no byte depends on the others. The thread that made the
 /// crew is a member too: it may simulate first, and joins with its own.

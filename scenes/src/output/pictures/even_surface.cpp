@@ -11,9 +11,8 @@
 namespace supple::scenes {
 namespace {
 
-constexpr double kStep = 0.5;      // of the way to the middle of the neighbours
-constexpr double kLeft = 0.05;     // of a wave of that width
-constexpr int kMostSteps = 400;
+constexpr double kLeft = 0.05;    // of a wave of that width, and of shorter ones
+constexpr int kMostSteps = 2000;  // enough for waves of three thousand edges
 
 using Key = std::array<std::uint64_t, 3>;
 Key key_of(const Vec3& p) { return {std::bit_cast<std::uint64_t>(p.x()), std::bit_cast<std::uint64_t>(p.y()), std::bit_cast<std::uint64_t>(p.z())}; }
@@ -79,24 +78,33 @@ void even_surface(double width, const std::vector<bool>& fixed, Mesh& mesh) {
   const Neighbours neighbours(mesh);
   double free_area = 0.0;
   const double before = volume_and_areas(mesh, free_area, fixed);
+  // A wave goes to its middle between neighbours by this share, on regular triangles; no wave by more than kFastest.
   const double wave = 2.0 * std::numbers::pi * mean_edge(mesh) / width;
-  const double lost = kStep * std::min(0.25 * wave * wave, 1.0);  // of a wave of that width, in a step on regular triangles
-  const int steps = std::clamp(static_cast<int>(std::ceil(std::log(kLeft) / std::log1p(-lost))), 1, kMostSteps);
-  std::vector<Vec3> moved(mesh.position.size());
+  constexpr double kFastest = 2.0;
+  const double slowest = std::min(0.25 * wave * wave, 0.5 * kFastest);
+  // The Chebyshev iteration (Saad 2003, algorithm 12.1): of waves between the two no more than kLeft stays after this number of steps.
+  const double middle = 0.5 * (kFastest + slowest), half = 0.5 * (kFastest - slowest), ratio = middle / half;
+  const int steps = std::clamp(static_cast<int>(std::ceil(std::acosh(1.0 / kLeft) / std::acosh(ratio))), 1, kMostSteps);
+  std::vector<Vec3> move(mesh.position.size(), Vec3::Zero());
+  double rho = 0.0;
   for (int step = 0; step < steps; ++step) {
-    for (std::size_t v = 0; v < moved.size(); ++v) {
-      Vec3 sum = Vec3::Zero();
+    const double next = step == 0 ? 1.0 / ratio : 1.0 / (2.0 * ratio - rho);
+    const double along = step == 0 ? 1.0 / middle : 2.0 * next / half;
+    for (std::size_t v = 0; v < move.size(); ++v) {
       const std::uint32_t first = neighbours.first[v], last = neighbours.first[v + 1];
+      if (fixed[v] || first == last) continue;
+      Vec3 sum = Vec3::Zero();
       for (std::uint32_t k = first; k < last; ++k) sum += mesh.position[neighbours.vertex[k]];
-      moved[v] = fixed[v] || first == last ? mesh.position[v] : Vec3(mesh.position[v] + kStep * (sum / (last - first) - mesh.position[v]));
+      move[v] = next * rho * move[v] + along * (sum / (last - first) - mesh.position[v]);
     }
-    std::swap(moved, mesh.position);
+    for (std::size_t v = 0; v < move.size(); ++v) mesh.position[v] += move[v];
+    rho = next;
   }
   constexpr int kRounds = 3;  // a surface that moves out has more area
   for (int round = 0; round <= kRounds; ++round) {
     const double after = volume_and_areas(mesh, free_area, fixed);
     const double out = round < kRounds && free_area > 0.0 ? (before - after) / free_area : 0.0;
-    for (std::size_t v = 0; v < moved.size(); ++v) {
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
       mesh.normal[v].normalize();
       if (!fixed[v]) mesh.position[v] += out * mesh.normal[v];
     }

@@ -69,7 +69,7 @@ void add_blurred_friction(const Scene& scene, const Simulation& simulation, std:
 
 SimulationOptions simulation_options(const RunOptions& options) {
   return {.threads = options.threads, .skip = options.skip, .profile = options.profile, .delaunay = options.delaunay, .interrupt = options.interrupt,
-          .memory = options.scene_memory};
+          .memory = options.scene_memory, .divide = options.divide};
 }
 
 /// A run whose estimated error exceeds the accuracy of the scene names the stage with the largest error.
@@ -378,7 +378,7 @@ RunResult replay(const Scene& scene, const RunOptions& options, const OutputRequ
       if (was_interrupted(options, result)) return;
       const int frame = frames[i];
       if (pictures_only && writer.pictures_drawn() > 0) {  // the first one shows what each needs
-        const int members = crew_size(options, frames.size() - i, resident_bytes() - before);
+        const int members = crew_size(scene, options, frames.size() - i, resident_bytes() - before);
         if (members > 1) {
           DrawingCrew crew({scene, options, outputs, {frames.begin() + static_cast<std::ptrdiff_t>(i), frames.end()}, last}, members,
                            {*simulation, writer, result}, report);
@@ -526,7 +526,7 @@ RunResult run_scene(const Scene& scene, const RunOptions& options) {
         // The first picture shows what each needs.
         if (!crew && writer.pictures_drawn() > 0 && !writer.needs_order()) {
           std::vector<int> frames = frames_to_draw(options, result.frames + 1, last_frame);
-          const int members = crew_size(options, frames.size(), resident_bytes() - before);
+          const int members = crew_size(scene, options, frames.size(), resident_bytes() - before);
           if (members > 1) {
             crew.emplace(DrawingCrew::Work{scene, drawing, outputs, std::move(frames), result.frames}, members,
                          DrawingCrew::Leader{*simulation, writer, result}, report);
