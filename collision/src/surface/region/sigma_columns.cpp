@@ -112,7 +112,7 @@ void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<
 }
 
 void add_flow(PairPressure& pressure, int side, const Apex& apex, double error, PatchPoints& points) {
-  constexpr double kEnough = 0.03;  // of a step, over the feature size and the root of the error: ends are off by its square
+  constexpr double kStep = 0.03;  // of a step, over the feature size and the root of the error: ends are off by its square
   const double sign = side == 0 ? 1.0 : -1.0, reach = 0.5 * pressure.feature_size();
   std::vector<Column> columns;
   std::vector<double> value;
@@ -121,7 +121,7 @@ void add_flow(PairPressure& pressure, int side, const Apex& apex, double error, 
     const Vec3 way = apex.way(at);
     columns.push_back({at, way, sign * points.area[i] * points.normal[i].dot(way), 1.0 / apex.distance(at), reach, 0.0, 0.0, false});
   }
-  find_ends(pressure, side, {kEnough * std::sqrt(error) * reach, reach, 0.0}, columns);
+  find_ends(pressure, side, {kStep * std::sqrt(error) * reach, reach, 0.0}, columns);
   const std::size_t begin = points.volume_point.size();
   // Columns may go through most of the body; two more digits ask for one more point.
   fill_columns(gauss_rule(std::clamp(static_cast<int>(std::lround(5.0 - 0.5 * std::log10(error))), 6, 10)), columns, points);
