@@ -168,6 +168,18 @@ function(supple_test module)
   endif()
   gtest_discover_tests(${target}
     PROPERTIES LABELS ${module} ENVIRONMENT TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp DISCOVERY_TIMEOUT 60 TIMEOUT ${limit})
+  # The start of a program with sanitizers takes as long as most tests: parts of all tests but the longest, for scripts/test.sh.
+  if(SUPPLE_SANITIZE AND ${module} MATCHES "core|implicit|collision")
+    set(parts 4)
+    file(STRINGS ${PROJECT_SOURCE_DIR}/tests/long_tests.txt long)
+    list(JOIN long ":" long)
+    foreach(part RANGE 1 ${parts})
+      math(EXPR index "${part} - 1")
+      add_test(NAME Quick.${module}.${part} COMMAND ${target} --gtest_brief=1)
+      set_tests_properties(Quick.${module}.${part} PROPERTIES LABELS quick TIMEOUT ${limit}
+        ENVIRONMENT "TMPDIR=${PROJECT_BINARY_DIR}/tests-tmp;GTEST_FILTER=-${long};GTEST_TOTAL_SHARDS=${parts};GTEST_SHARD_INDEX=${index}")
+    endforeach()
+  endif()
 endfunction()
 
 # Installs the CMake package, scenes, documents and licence; each library installs itself.
