@@ -96,29 +96,28 @@ class Signals(unittest.TestCase):
         subprocess.run([SUPPLE, "run", "some.yaml", "--out", "some", "--simulate-only", "--quiet"], cwd=SCRATCH, check=True)
 
     def ends_soon(self, *words, after=(0.3, 0.8), by_clock=False, ends=None, message=b"interrupted"):
-        """`after`: processor time of the command, or seconds of the clock, before the signal. `ends`: exit codes by signal, where others than 128 + its number."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            for worked in after:
-                with self.subTest(words=words, signal=number, after=worked):
-                    before = processor_time()
-                    process = subprocess.Popen([SUPPLE, *words], cwd=SCRATCH, env=WITHOUT_LEAK_CHECK, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
-                    began = time.monotonic()
-                    while process.poll() is None and (time.monotonic() - began if by_clock else time_of(process)) < worked:
-                        time.sleep(0.01)
-                    self.assertIsNone(process.poll(), "ended before the signal")
-                    began, used = time.monotonic(), time_of(process)
-                    process.send_signal(number)
-                    told = process.communicate(timeout=60)[1]
-                    waited, used = time.monotonic() - began, processor_time() - before - used
-                    self.assertEqual(process.returncode, ends(number) if ends else 128 + number, told)
-                    self.assertIn(message, told)
-                    # A second of the clock, or on a busy machine of processor time.
-                    self.assertLess(min(waited, used), 1.1)
-                    self.assertEqual(alive(process.pid), [])
-                    left = list(SCRATCH.rglob("*.tmp"))
-                    for path in left:  # the next commands leave none of their own
-                        path.unlink()
-                    self.assertEqual(left, [])
+        """`after`: processor time of the command, or seconds of the clock, before each of the two signals. `ends`: exit codes by signal, where others than 128 + its number."""
+        for number, worked in zip((signal.SIGINT, signal.SIGTERM), after, strict=True):
+            with self.subTest(words=words, signal=number, after=worked):
+                before = processor_time()
+                process = subprocess.Popen([SUPPLE, *words], cwd=SCRATCH, env=WITHOUT_LEAK_CHECK, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
+                began = time.monotonic()
+                while process.poll() is None and (time.monotonic() - began if by_clock else time_of(process)) < worked:
+                    time.sleep(0.01)
+                self.assertIsNone(process.poll(), "ended before the signal")
+                began, used = time.monotonic(), time_of(process)
+                process.send_signal(number)
+                told = process.communicate(timeout=60)[1]
+                waited, used = time.monotonic() - began, processor_time() - before - used
+                self.assertEqual(process.returncode, ends(number) if ends else 128 + number, told)
+                self.assertIn(message, told)
+                # A second of the clock, or on a busy machine of processor time.
+                self.assertLess(min(waited, used), 1.1)
+                self.assertEqual(alive(process.pid), [])
+                left = list(SCRATCH.rglob("*.tmp"))
+                for path in left:  # the next commands leave none of their own
+                    path.unlink()
+                self.assertEqual(left, [])
 
     def test_while_a_large_scene_is_read(self):
         self.ends_soon("check", "large.yaml", "--time-limit", "1000", *MEMORY)
@@ -138,26 +137,26 @@ class Signals(unittest.TestCase):
     def test_in_outputs_of_a_run(self):
         fine = ["--out", "some", "--set", "output.cell=0.004", "--progress", "none"]
         files = {path: path.stat().st_size for path in (SCRATCH / "some").rglob("*")}
-        self.ends_soon("export", "some.yaml", *fine, "--mesh", "usd", after=(0.5,))
-        self.ends_soon("export", "some.yaml", *fine, "--gltf", after=(0.5,))
-        self.ends_soon("export", "some.yaml", *fine, "--grid", "vdb", after=(0.5,))
+        self.ends_soon("export", "some.yaml", *fine, "--mesh", "usd", after=(0.5, 0.5))
+        self.ends_soon("export", "some.yaml", *fine, "--gltf", after=(0.5, 0.5))
+        self.ends_soon("export", "some.yaml", *fine, "--grid", "vdb", after=(0.5, 0.5))
         self.assertFalse((SCRATCH / "some/some.usda").exists())
         self.assertFalse((SCRATCH / "some/some.glb").exists())
-        self.ends_soon("render", "some.yaml", *fine, "--set", "render.renderer=path", "--set", "render.noise=0.001", after=(0.5,))
-        self.ends_soon("run", "long.yaml", "--dry-run", "--set", "render.renderer=path", after=(0.5,))
+        self.ends_soon("render", "some.yaml", *fine, "--set", "render.renderer=path", "--set", "render.noise=0.001", after=(0.5, 0.5))
+        self.ends_soon("run", "long.yaml", "--dry-run", "--set", "render.renderer=path", after=(0.5, 0.5))
         for path, size in files.items():
             if path.suffix == ".state":
                 self.assertEqual(path.stat().st_size, size)
 
     def test_in_a_view(self):
-        self.ends_soon("view", "some", "--cells", "512", "--size", "900M", after=(0.5,))
+        self.ends_soon("view", "some", "--cells", "512", "--size", "900M", after=(0.5, 0.5))
         self.assertFalse((SCRATCH / "some/some_view.html").exists())
-        self.ends_soon("run", "long.yaml", "--out", "viewed", "--overwrite", "--view", after=(0.5,))
+        self.ends_soon("run", "long.yaml", "--out", "viewed", "--overwrite", "--view", after=(0.5, 0.5))
         # A signal is the way to end it.
-        self.ends_soon("view", "some", "--serve", after=(1.0,), by_clock=True, ends=lambda _: 0, message=b"")
+        self.ends_soon("view", "some", "--serve", after=(1.0, 1.0), by_clock=True, ends=lambda _: 0, message=b"")
 
     def test_in_a_sweep(self):
-        self.ends_soon("sweep", "long.yaml", "--set", "objects.ball.particles.mass=1:2:8", "--out", "swept", "--overwrite", "--jobs", "2", after=(1.0,), by_clock=True)
+        self.ends_soon("sweep", "long.yaml", "--set", "objects.ball.particles.mass=1:2:8", "--out", "swept", "--overwrite", "--jobs", "2", after=(1.0, 1.0), by_clock=True)
         self.assertFalse((SCRATCH / "swept/table.csv").exists())
         for report in (SCRATCH / "swept").rglob("result.json"):
             self.assertEqual(json.loads(report.read_text())["outcome"], "interrupted")
@@ -171,7 +170,7 @@ class Signals(unittest.TestCase):
 
     @unittest.skipUnless((SUPPLE.parent / "supple_bench").exists(), "built without the program of benchmarks")
     def test_in_a_benchmark(self):
-        self.ends_soon("bench", "collision/pile", "3000", after=(0.5,), ends=lambda number: -number, message=b"")
+        self.ends_soon("bench", "collision/pile", "3000", after=(0.5, 0.5), ends=lambda number: -number, message=b"")
 
 
 if __name__ == "__main__":

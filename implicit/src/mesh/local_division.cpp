@@ -19,9 +19,6 @@ namespace {
 using Corners = std::array<std::uint32_t, 3>;
 
 constexpr std::size_t kTrianglesPerTask = 512;
-// Coarse triangles over those of two rounds before. Along a curve they become fourfold until they are small enough; where they cannot move
-// onto the surface, sixteenfold.
-constexpr std::size_t kMostGrowth = 8;
 constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
 /// A divided edge from a to b, a < b; `middle` is its new vertex.
@@ -94,8 +91,8 @@ class Round {
   void list_movers();
   void divide_triangles();
   void move();
-  /// @return whether vertices were put back
-  bool take_back();
+  /// Puts vertices of triangles that are inverted or intersect others back. @param changed  triangles to test; receives those that this changed
+  void take_back(std::vector<std::uint32_t>& changed);
   void put_back(Mover& mover);
   [[nodiscard]] bool is_near(const Vec3& p) const;
   [[nodiscard]] std::uint32_t middle_of(std::uint32_t a, std::uint32_t b) const;
@@ -235,9 +232,9 @@ void Round::divide_triangles() {
   error_ = std::move(errors);
 }
 
-bool Round::take_back() {
-  std::vector<std::uint8_t> of_moved(mesh_.triangle_count(), 0);  // triangles with a vertex that moved
-  std::vector<std::uint32_t> number, back;                        // of such triangles; movers
+void Round::take_back(std::vector<std::uint32_t>& changed) {
+  std::vector<std::uint8_t> is_changed(mesh_.triangle_count(), 0);
+  std::vector<std::uint32_t> back;  // movers
   const auto has_moved = [&](std::uint32_t v) { return moves_[v] != kNone && mover_[moves_[v]].moved; };
   const auto add_farthest = [&](std::span<const Corners> triangles, std::vector<std::uint32_t>& to) {
     std::uint32_t farthest = kNone;
@@ -253,20 +250,18 @@ bool Round::take_back() {
     }
     if (farthest != kNone) to.push_back(farthest);
   };
-  for (const std::uint32_t n : part_) {
+  for (const std::uint32_t n : changed) {
     const Corners& t = mesh_.triangle[n];
-    if (std::none_of(t.begin(), t.end(), has_moved)) continue;
-    of_moved[n] = 1;
-    number.push_back(n);
+    is_changed[n] = 1;
     if (is_inverted(mesh_, t)) add_farthest(std::span(&t, 1), back);
   }
-  const TriangleBoxes boxes(mesh_.position, mesh_.triangle, number);
+  const TriangleBoxes boxes(mesh_.position, mesh_.triangle, changed);
   std::vector<std::vector<std::uint32_t>> found((mesh_.triangle_count() + kTrianglesPerTask - 1) / kTrianglesPerTask);
   executor_.for_blocks(mesh_.triangle_count(), kTrianglesPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const Corners& t = mesh_.triangle[n];
       boxes.each_near(box_of(mesh_.position, t), [&](std::uint32_t other) {
-        if (other == n || (of_moved[n] != 0 && other < n)) return;  // once for each pair
+        if (other == n || (is_changed[n] != 0 && other < n)) return;  // once for each pair
         const Corners& s = mesh_.triangle[other];
         if (share_an_edge(s, t) || !triangles_cross(mesh_.position, s, t)) return;
         add_farthest(std::array{s, t}, found[begin / kTrianglesPerTask]);
@@ -276,15 +271,23 @@ bool Round::take_back() {
   for (const std::vector<std::uint32_t>& part : found) back.insert(back.end(), part.begin(), part.end());
   std::sort(back.begin(), back.end());
   back.erase(std::unique(back.begin(), back.end()), back.end());
-  for (const std::uint32_t m : back) put_back(mover_[m]);
-  return !back.empty();
+  std::vector<std::uint8_t> is_back(mover_.size(), 0);
+  for (const std::uint32_t m : back) {
+    put_back(mover_[m]);
+    is_back[m] = 1;
+  }
+  changed.clear();
+  for (const std::uint32_t n : part_) {
+    const Corners& t = mesh_.triangle[n];
+    if (std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return moves_[v] != kNone && is_back[moves_[v]] != 0; })) changed.push_back(n);
+  }
 }
 
 void Round::divide() {
   list_movers();
   divide_triangles();
   move();
-  while (take_back()) {}
+  for (std::vector<std::uint32_t> changed = part_; !changed.empty();) take_back(changed);
   off_.clear();
   for (const Mover& mover : mover_) {
     if (!mover.moved) off_.push_back(mover.vertex);
@@ -292,12 +295,12 @@ void Round::divide() {
 }
 
 /// Measures the triangles whose error is negative: centroid_error, and where a vertex is not on the surface, the distance to the point that
-/// Newton's method leads to. @return the largest of all [m]
-double measure(const FieldView& field, Measured& of, const Executor& executor) {
+/// Newton's method leads to. Of `every` triangles one, from `first` on.
+void measure(const FieldView& field, Measured& of, const Executor& executor, std::size_t first = 0, std::size_t every = 1) {
   std::vector<std::uint8_t> is_off(of.mesh.vertex_count(), 0);
   for (const std::uint32_t v : of.off) is_off[v] = 1;
   std::vector<std::uint32_t> on, off;
-  for (std::size_t n = 0; n < of.error.size(); ++n) {
+  for (std::size_t n = first; n < of.error.size(); n += every) {
     if (of.error[n] >= 0.0) continue;
     const Corners& t = of.mesh.triangle[n];
     (is_off[t[0]] + is_off[t[1]] + is_off[t[2]] > 0 ? off : on).push_back(static_cast<std::uint32_t>(n));
@@ -317,7 +320,6 @@ double measure(const FieldView& field, Measured& of, const Executor& executor) {
       of.error[off[i]] = foot.converged ? (foot.point - centroid).norm() : std::numeric_limits<double>::infinity();
     }
   });
-  return of.error.empty() ? 0.0 : *std::max_element(of.error.begin(), of.error.end());
 }
 
 }  // namespace
@@ -329,17 +331,26 @@ const Mesh* LocalDivision::divide(const FieldView& field, const Mesh& from, doub
     for (std::size_t k = 0; k < 3; ++k) reach2 = std::max(reach2, (mesh_.position[t[k]] - mesh_.position[t[next(k)]]).squaredNorm());
   }
   Measured of{mesh_, std::vector<double>(mesh_.triangle_count(), -1.0), {}};
+  const auto coarse = [&](std::size_t n) { return of.error[n] >= 0.0 && is_coarse(mesh_, mesh_.triangle[n], of.error[n], goal); };
+  const auto count_coarse = [&] {
+    std::size_t count = 0;
+    for (std::size_t n = 0; n < mesh_.triangle_count(); ++n) count += coarse(n) ? 1 : 0;
+    return count;
+  };
+  // Each coarse triangle has three divided edges, each edge two triangles that become one more: an eighth of the triangles often shows that they get too many.
+  constexpr std::size_t kParts = 8;
+  for (std::size_t part = 0; part < kParts; ++part) {
+    measure(field, of, executor, part, kParts);
+    if (mesh_.triangle_count() + 3 * count_coarse() > most) return nullptr;
+  }
   std::size_t last = mesh_.triangle_count(), before = last;  // coarse triangles of the last two rounds
-  for (;;) {
-    error_ = measure(field, of, executor);
-    std::size_t coarse = 0;
-    for (std::size_t n = 0; n < mesh_.triangle_count(); ++n) coarse += is_coarse(mesh_, mesh_.triangle[n], of.error[n], goal) ? 1 : 0;
-    if (coarse == 0) break;
-    if (coarse > kMostGrowth * std::exchange(before, std::exchange(last, coarse))) return nullptr;
+  for (std::size_t count; (count = count_coarse()) > 0; measure(field, of, executor)) {
+    if (count > 2 * std::exchange(before, std::exchange(last, count))) return nullptr;  // some do not reach the surface
     Round round(field, executor, goal, std::sqrt(reach2), of);
     if (round.triangle_count() > most) return nullptr;
     round.divide();
   }
+  error_ = of.error.empty() ? 0.0 : *std::max_element(of.error.begin(), of.error.end());
   return &mesh_;
 }
 
