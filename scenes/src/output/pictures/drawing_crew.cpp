@@ -47,7 +47,8 @@ int crew_size(const Scene& scene, const RunOptions& options, std::size_t frames,
   const int wanted = options.frames_at_once > 0 ? options.frames_at_once : std::min(Executor(options.threads).threads(), worthwhile_contexts(scene, frames));
   const int most = std::min<int>(static_cast<int>(std::min<std::size_t>(frames, 64)), wanted);
   const double memory = options.memory > 0.0 ? options.memory : 0.5 * free_bytes();
-  const double room = share > 0.0 ? memory / share : most;
+  constexpr double kLeastShare = 1 << 20;  // [byte]: a process that reuses freed memory does not grow
+  const double room = memory / std::max(share, kLeastShare);
   return std::max(1, static_cast<int>(std::min<double>(most, room)));
 }
 

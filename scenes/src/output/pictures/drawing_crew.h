@@ -17,7 +17,7 @@ namespace supple::scenes {
 
 /// Memory of this process [byte].
 [[nodiscard]] double resident_bytes();
-/// Number of frames to draw at the same time when each needs `share` bytes; one where times are measured exactly, and where there is so little to draw that
+/// Number of frames to draw at the same time when each needs `share` bytes, at least a megabyte; one where times are measured exactly, and where there is so little to draw that
 /// another OpenGL context takes longer than it saves.
 [[nodiscard]] int crew_size(const Scene& scene, const RunOptions& options, std::size_t frames, double share);
 
