@@ -102,7 +102,7 @@ def page(rows):
            "and CPU times of the dry run and of `supple run --preview` over that of the run. Both the run and the dry run draw one frame at a time.", "",
            "A preview saves most where pictures are most of the run. It draws fewer frames, makes no estimates of errors and no contact sheet, finds contacts by a quarter of the samples and leaves",
            "bodies whole where they touch. What limits it: steps that a scene fixes or that friction needs stay as they are, and long thin contacts need thousands of points whatever error is asked",
-           "(`ball_in_ring`: four thousand on a thin ring). The runs of `sheet_dents`, `shell_dents` and `blob_keeps_its_volume` make no film, their previews do. Stills (one frame) have no film; their",
+           "(`ball_in_ring`: four thousand on a thin ring). Stills (one frame) have no film; their",
            "previews take as long as the start of the program with OpenGL: 0.05 s for the libraries to load, 0.1 s for the context, the shaders and the picture.", "",
            "| scene | frames | run, CPU s | " + " | ".join(("CPU", "memory", "disk", "particles", "steps", "triangles")) + " | dry run | preview, CPU s | preview |",
            "|---|---|---|" + "---|" * 9]

@@ -158,7 +158,8 @@ SinCos sin_cos(double x) noexcept {
   const double w = 1.0 - half_z;
   const double cosine = w + (((1.0 - w) - half_z) + std::fma(z * z, polynomial(kCosSeries, z), -r * rest));
 
-  switch (static_cast<std::int64_t>(n) & 3) {
+  constexpr double kFirstTooLarge = 0x1p63;  // for an integer; digits of n that tell the quarter are lost before
+  switch (std::abs(n) < kFirstTooLarge ? static_cast<std::int64_t>(n) & 3 : 0) {
     case 0: return {sine, cosine};
     case 1: return {cosine, -sine};
     case 2: return {-sine, -cosine};

@@ -182,6 +182,13 @@ Soup read_data(const std::filesystem::path& file, const FitOptions& options, Rep
   return soup_of(surface_through_points(file, options.error, repair));
 }
 
+/// @pre closed
+bool is_flat(const SurfaceMesh& mesh) {
+  constexpr double kLeast = 1e-6;
+  const double area = pmp::area(mesh);
+  return !(std::abs(pmp::volume(mesh)) > kLeast * area * std::sqrt(area));
+}
+
 }  // namespace
 
 Mesh read_surface(const std::filesystem::path& file, const FitOptions& options, Repair& repair, const Executor& executor) {
@@ -196,13 +203,12 @@ Mesh read_surface(const std::filesystem::path& file, const FitOptions& options, 
   const bool solid = options.kind == Kind::Solid;
   if (solid) close_holes(file, mesh, repair);
   keep_pieces(file, mesh, options.pieces, repair);
-  repair.turned = CGAL::is_closed(mesh) && !pmp::is_outward_oriented(mesh);
+  const bool flat = CGAL::is_closed(mesh) && is_flat(mesh);  // such a mesh has no outside
+  if (solid && flat) refuse(file, "expected a mesh that encloses a volume", "a flat one", "fit a surface without inside by --kind shell");
+  repair.turned = CGAL::is_closed(mesh) && !flat && !pmp::is_outward_oriented(mesh);
   if (repair.turned) pmp::reverse_face_orientations(mesh);
   repair.vertices = mesh.number_of_vertices();
   repair.triangles = mesh.number_of_faces();
-  if (!solid) return plain_mesh(mesh);
-  const double volume = pmp::volume(mesh), area = pmp::area(mesh);
-  if (!(volume > 1e-6 * area * std::sqrt(area))) refuse(file, "expected a mesh that encloses a volume", "a flat one", "fit a surface without inside by --kind shell");
   return plain_mesh(mesh);
 }
 
