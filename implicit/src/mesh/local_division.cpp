@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "mesh/curved_middle.h"
 #include "mesh/error_search.h"
 #include "mesh/triangle_crossings.h"
 #include "supple/implicit/project.h"
@@ -151,11 +152,9 @@ void Round::list_movers() {
   };
   for (const std::uint32_t v : off_) add(v, mesh_.position[v], mesh_.position[v]);
   for (const Edge& edge : edge_) {
-    const Vec3 along = mesh_.position[edge.b] - mesh_.position[edge.a], middle = 0.5 * (mesh_.position[edge.a] + mesh_.position[edge.b]);
-    const Vec3 &from = mesh_.normal[edge.a], &to = mesh_.normal[edge.b];
-    mesh_.normal[edge.middle] = from;
-    // Middle of the cubic that is perpendicular to both normals (Vlachos et al. 2001, "Curved PN triangles").
-    add(edge.middle, middle - 0.125 * (along.dot(from) * from - along.dot(to) * to), middle);
+    const Vec3 &a = mesh_.position[edge.a], &b = mesh_.position[edge.b];
+    mesh_.normal[edge.middle] = mesh_.normal[edge.a];
+    add(edge.middle, curved_middle(a, mesh_.normal[edge.a], b, mesh_.normal[edge.b]), 0.5 * (a + b));
   }
 }
 

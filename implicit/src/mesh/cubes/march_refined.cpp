@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "field/bytes_of.h"
+#include "mesh/curved_middle.h"
 #include "mesh/error_search.h"
 #include "mesh/partition/polygonise_block_edges.h"
 
@@ -192,10 +193,7 @@ void RefinedMarcher::cut(int step, bool may_cross, const Executor& executor, Cut
           const std::uint32_t a = t[k], b = end_of(t, k);
           if (a < b) {
             if (known != nullptr) continue;
-            // Middle of the cubic that is perpendicular to both normals (Vlachos et al. 2001, "Curved PN triangles").
-            const Vec3 along = from.position[b] - from.position[a];
-            points.push_back(0.5 * (from.position[a] + from.position[b]) -
-                             0.125 * (along.dot(from.normal[a]) * from.normal[a] - along.dot(from.normal[b]) * from.normal[b]));
+            points.push_back(curved_middle(from.position[a], from.normal[a], from.position[b], from.normal[b]));
           } else {
             std::uint32_t at = b == 0 ? 0 : scratch.start[b - 1];  // starts have moved to the ends
             while (scratch.target[at] != a) ++at;
