@@ -88,6 +88,26 @@ TEST(LocalDivision, DoesNotDependOnThreads) {
   for (const int threads : {2, 5}) EXPECT_EQ(hash_of(*division.divide(body.field, from, goal, kAnyNumber, Executor(threads))), expected);
 }
 
+// Where a neck is narrow for the triangles, new vertices could pass those around them.
+TEST(LocalDivision, InvertsNoTriangle) {
+  int divided = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const Body body = random_body({.seed = seed, .parts = 25});
+    const Mesh from = march_cubes(body.field, {.lattice = lattice_of(first_cell(body.field, 0.0))}, Executor(2));
+    LocalDivision division;
+    const Mesh* mesh = division.divide(body.field, from, 0.1 * centroid_error(body.field, from, Executor(2)), kAnyNumber, Executor(2));
+    if (mesh == nullptr) continue;
+    ++divided;
+    for (const auto& t : mesh->triangle) {
+      if (std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return v >= from.vertex_count(); })) {
+        const Vec3 area = (mesh->position[t[1]] - mesh->position[t[0]]).cross(mesh->position[t[2]] - mesh->position[t[0]]);
+        EXPECT_GT(area.dot(mesh->normal[t[0]] + mesh->normal[t[1]] + mesh->normal[t[2]]), 0.0) << seed;
+      }
+    }
+  }
+  EXPECT_GT(divided, 2);
+}
+
 // Bridges over a valley that no vertex reaches without intersections: it ends all the same, without a mesh.
 TEST(LocalDivision, EndsWhereVerticesDoNotReachTheSurface) {
   const FunctionField field = noise(3, 0.5);
