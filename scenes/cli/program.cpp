@@ -16,6 +16,7 @@
 #include "supple/core/error.h"
 #include "supple/core/interrupt.h"
 #include "supple/core/io/descriptor.h"
+#include "supple/core/io/open_temporaries.h"
 #include "supple/scenes/run.h"
 
 namespace supple::tool {
@@ -35,7 +36,7 @@ double seconds_of(clockid_t clock) {
 // When the program was interrupted: of the clock and of its processor time [s].
 double interrupted_at = 0.0, interrupted_after = 0.0;
 
-/// Ends the program as a kill does where its work has not ended within a second, as inside a library it may not: all that is complete on the disk stays. On a busy
+/// Ends the program as a kill does where its work has not ended within a second, as inside a library it may not: all that is complete on the disk stays, and temporary files go. On a busy
 /// machine work that has had little processor time gets ten seconds.
 void end_if_late(int /*number*/) {
   constexpr double kSoon = 0.8, kLate = 10.0, kWork = 0.5;
@@ -43,6 +44,7 @@ void end_if_late(int /*number*/) {
   if (waited < kSoon || (waited < kLate && seconds_of(CLOCK_PROCESS_CPUTIME_ID) - interrupted_after < kWork)) return;
   constexpr std::string_view kMessage = "interrupted, in the middle of a calculation\n";
   (void)!write(STDERR_FILENO, kMessage.data(), kMessage.size());
+  io::remove_open_temporaries();
   _exit(kSignalExit + interrupted);
 }
 

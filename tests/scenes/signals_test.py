@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Every long command ends within a second of SIGINT or SIGTERM, with 130 or 143, and leaves no incomplete or temporary file and no process.
 
-usage: signals_test.py SUPPLE SCRATCH
+usage: signals_test.py SUPPLE SCRATCH ENDLESS_SYNC
+
+ENDLESS_SYNC: a library to load first, in which writing a file to the disk never ends.
 """
 import json
 import math
@@ -15,7 +17,7 @@ import sys
 import time
 import unittest
 
-SUPPLE, SCRATCH = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
+SUPPLE, SCRATCH, ENDLESS_SYNC = (pathlib.Path(word).resolve() for word in sys.argv[1:])
 # Minutes of work for one thread before the first step.
 LARGE = """schema: 1
 duration: 0.1
@@ -95,12 +97,13 @@ class Signals(unittest.TestCase):
         (SCRATCH / "some.yaml").write_text(LONG.replace("duration: 100 s", "duration: 0.5 s"))
         subprocess.run([SUPPLE, "run", "some.yaml", "--out", "some", "--simulate-only", "--quiet"], cwd=SCRATCH, check=True)
 
-    def ends_soon(self, *words, after=(0.3, 0.8), by_clock=False, ends=None, message=b"interrupted"):
+    def ends_soon(self, *words, after=(0.3, 0.8), by_clock=False, ends=None, message=b"interrupted", preload=None):
         """`after`: processor time of the command, or seconds of the clock, before each of the two signals. `ends`: exit codes by signal, where others than 128 + its number."""
         for number, worked in zip((signal.SIGINT, signal.SIGTERM), after, strict=True):
             with self.subTest(words=words, signal=number, after=worked):
                 before = processor_time()
-                process = subprocess.Popen([SUPPLE, *words], cwd=SCRATCH, env=WITHOUT_LEAK_CHECK, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
+                environment = WITHOUT_LEAK_CHECK | ({"LD_PRELOAD": str(preload)} if preload else {})
+                process = subprocess.Popen([SUPPLE, *words], cwd=SCRATCH, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
                 began = time.monotonic()
                 while process.poll() is None and (time.monotonic() - began if by_clock else time_of(process)) < worked:
                     time.sleep(0.01)
@@ -131,7 +134,12 @@ class Signals(unittest.TestCase):
         self.ends_soon("run", "long.yaml", "--overwrite", "--set", "render.renderer=path")
 
     def test_in_a_mesh(self):
-        self.ends_soon("query", "mesh", "long.yaml", "--cells", "768", "--out", "mesh.ply", *MEMORY)
+        self.ends_soon("query", "mesh", "long.yaml", "--cells", "768", "--out", "mesh.ply", *MEMORY, after=(0.3, 0.6))
+        self.assertFalse((SCRATCH / "mesh.ply").exists())
+
+    def test_in_a_file_that_is_never_written(self):
+        """The program ends in the middle of a call, and its temporary file goes."""
+        self.ends_soon("query", "mesh", "long.yaml", "--cells", "16", "--out", "mesh.ply", after=(1.0, 1.0), message=b"in the middle of a calculation", preload=ENDLESS_SYNC)
         self.assertFalse((SCRATCH / "mesh.ply").exists())
 
     def test_in_outputs_of_a_run(self):
