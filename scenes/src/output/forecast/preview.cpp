@@ -33,7 +33,7 @@ void add_frame_rate(const Scene& scene, std::vector<std::string>& out) {
 void add_meshing(const Scene& scene, const Model& model, std::vector<std::string>& out) {
   if (!(model.cell > 0.0)) return;
   out.push_back("output.cell=" + number_text(kCoarserCell * model.cell));
-  out.emplace_back("output.meshing={search: false}");
+  out.emplace_back("output.meshing={method: cubes, search: false}");
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const ObjectMeshingDesc& own = scene.objects[i].meshing;
     const std::string key = "objects." + scene.objects[i].name + ".meshing";
