@@ -27,6 +27,10 @@ struct TimedQuery {
     }
     return surface.summary;
   }
+  /// Of the last answer. @return of each pair [J]
+  [[nodiscard]] std::vector<double> estimate_energies(std::span<const collision::ContactBody> bodies, double error) const {
+    return collision::estimate_energies(bodies, candidates, {.error = error}, Executor(1), surface);
+  }
 };
 
 }  // namespace supple::benchmarks

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "supple/core/error.h"
 #include "surface/kept_results.h"
@@ -136,6 +137,34 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
     keep_room(results, kMostKept);
   }
   resize(out, size, false);
+}
+
+std::vector<double> estimate_energies(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const ContactSettings& settings,
+                                      const Executor& executor, const ContactSurface& surface) {
+  SUPPLE_EXPECTS(settings.energy);
+  if (surface.summary.empty()) return {};
+  constexpr double kFiner = 1e-2, kFine = 1e-6, kFinest = 1e-10;  // error of the other solution, over that of the surface; at most; at least
+  constexpr double kSafety = 3.0, kAlike = 0.2, kMostAlike = 2e-5;  // over the difference; what both may miss alike, over the error and over the energy
+  ContactSettings other = settings;
+  other.error = std::clamp(kFiner * settings.error, kFinest, kFine);
+  other.other_columns = true;
+  ContactSurface compared;
+  solve_contact_surface(bodies, candidates, other, executor, compared);
+  std::vector<double> off(bodies.size(), 0.0), alike(bodies.size(), 0.0);  // how pairs share what a body loses depends on where its columns begin: all pairs of a body together do not
+  const auto add = [&off](const ContactSurface& solved, double sign) {
+    for (const ContactSurface::Summary& s : solved.summary) {
+      off[s.bodies.a] += sign * s.energy_a;
+      off[s.bodies.b] += sign * s.energy_b;
+    }
+  };
+  add(surface, 1.0);
+  const double share = std::min(kAlike * settings.error, kMostAlike);
+  for (std::size_t i = 0; i < bodies.size(); ++i) alike[i] = share * std::abs(off[i]);
+  add(compared, -1.0);
+  std::vector<double> estimate;
+  const auto of = [&](std::uint32_t body) { return kSafety * std::abs(off[body]) + alike[body]; };
+  for (const ContactSurface::Summary& s : surface.summary) estimate.push_back(of(s.bodies.a) + of(s.bodies.b));
+  return estimate;
 }
 
 }  // namespace supple::collision

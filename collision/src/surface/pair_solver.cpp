@@ -499,8 +499,8 @@ void PairSolver::choose(const Job& job, PairResult& out) {
 /// Of squeezed regions that are filled as they are. Forces and moments are the sums on Sigma: how regions share them out among the parts of a body need
 /// not be better.
 double PairSolver::region_error(const ContactSettings& settings) {
-  constexpr double kFinest = 1e-4, kToShare = 1e-2;
-  return std::max(settings.error, settings.energy ? kFinest : kToShare);
+  constexpr double kFinest = 1e-4, kFinestOfOther = 1e-5, kToShare = 1e-2;
+  return std::max(settings.error, !settings.energy ? kToShare : settings.other_columns ? kFinestOfOther : kFinest);
 }
 
 /// Squeezed regions that columns from Sigma may not hold, or whose Sigma is worse than asked, are filled as they are.
@@ -585,7 +585,7 @@ void PairSolver::find_apexes(Job& job, const Partners& partners) {
     others_.clear();
     for (const std::uint32_t c : partners.of(body)) others_.push_back(&job.bodies[c]);
     std::size_t taker = 0;
-    apex_[side] = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, taker);
+    apex_[side] = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, job.settings().other_columns ? ApexRank::Next : ApexRank::Best, taker);
     if (!apex_[side]) continue;
     const std::uint32_t by = partners.of(body)[taker];
     apex_[side]->lost = apex_[side]->lost && (by == other || (team_ != nullptr && fixed(other) && std::binary_search(team_->member.begin(), team_->member.end(), by)));
@@ -657,7 +657,9 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
   ContactSurface::Summary& summary = out.summary;
   summary.load = out.load;
   if (out.load > 0.0) summary.centre_of_pressure = out.first / out.load;
-  summary.energy = out.points.energy[0] + out.points.energy[1];
+  summary.energy_a = out.points.energy[0];
+  summary.energy_b = out.points.energy[1];
+  summary.energy = summary.energy_a + summary.energy_b;
   summary.displaced_a = out.points.displaced[0];
   summary.displaced_b = out.points.displaced[1];
   summary.residual = out.points.residual / pressure.largest_modulus();

@@ -92,6 +92,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
     cpu_s = std::min(cpu_s, process_cpu_seconds() - begin);
   }
   const collision::ContactSurface& surface = simulation.contacts();
+  const std::vector<double> energy_error = simulation.energy_estimates();
   const SpareMemory spare(kSpareForJson);
   ordered_json json;
   json["time_s"] = simulation.time();
@@ -109,6 +110,7 @@ std::string query_contact(Simulation& simulation, bool samples) {
                          {"area_m2", s.area},
                          {"centre_of_pressure_m", vector(s.centre_of_pressure)},
                          {"energy_j", s.energy},
+                         {"energy_error_j", energy_error[k]},
                          {"capacity_j", capacity_of(simulation, s)},
                          {"largest_pressure_pa", s.largest_pressure},
                          {"largest_overlap_m", s.largest_overlap},

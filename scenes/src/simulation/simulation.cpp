@@ -433,6 +433,12 @@ const collision::ContactSurface& Simulation::contacts() {
   return impl_->pulled.surface;
 }
 
+std::vector<double> Simulation::energy_estimates() {
+  impl_->pull_contacts();
+  const Frame& frame = impl_->pulled;
+  return collision::estimate_energies(frame.bodies, frame.candidates, impl_->model.contact, impl_->executor, frame.surface);
+}
+
 std::span<const collision::ContactBody> Simulation::contact_bodies() {
   impl_->pull_contacts();
   return impl_->pulled.bodies;

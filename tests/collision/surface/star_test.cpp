@@ -152,6 +152,9 @@ TEST(Star, HasTheForcesOfBodiesThatGoThroughEachOtherWithoutTheirEnergies) {
   }
 }
 
+/// One of which Sigma seems far away, to first order, from a place that it is near to.
+TEST(Star, HasTheEnergyWhereSigmaIsNearToTheMiddleOfABody) { expect_forces_and_energy_of_volumes(3, 1, 9917 + 51); }
+
 /// One of three, as one pair of them meets on a closed surface that lies in the third body.
 TEST(Star, LiesInTheThirdBodyWithAllOfAClosedSurface) { expect_forces_and_energy_of_volumes(3, 1, 2026 + 49); }
 TEST(Star, OfRandomQuadruplesHasTheForcesAndTheEnergyOfTheVolumesThatTheyLose) { expect_forces_and_energy_of_volumes(4, 5, 200); }

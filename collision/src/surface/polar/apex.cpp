@@ -13,6 +13,8 @@
 namespace supple::collision {
 namespace {
 
+constexpr std::size_t kLookedAt = 8;  // places that Sigma is far from to first order
+
 /// Distances along rays out of the apex to where the body ends; its pressure is positive at the apex and falls through 0 once on each.
 void find_ends(PairPressure& pressure, int side, const Vec3& apex, std::span<const Vec3> way, int steps, std::vector<double>& end) {
   const double longest = pressure.field(side).surface_box().extent().norm();
@@ -45,6 +47,72 @@ Apex apex_across(PairPressure& pressure, int side, const Vec3& from, const Vec3&
   return kept >= lost ? Apex{.at = from - 0.5 * kept * outward} : Apex{.at = from + 0.5 * lost * outward, .lost = true};
 }
 
+/// The pressure of a body at places, and the largest one of others there.
+struct Presses {
+  std::vector<double> own, most;
+  std::vector<Vec3> slope, slope_of_most;
+  std::vector<std::size_t> by;  ///< whose the largest is
+
+  Presses(PairPressure& pressure, int side, Thirds others, std::span<const Vec3> place)
+      : own(place.size()), most(place.size(), 0.0), slope(place.size()), slope_of_most(place.size(), Vec3::Zero()), by(place.size(), 0) {
+    pressure.evaluate(side, place, own, slope);
+    std::vector<double> value(place.size());
+    std::vector<Vec3> gradient(place.size());
+    for (std::size_t b = 0; b < others.size(); ++b) {
+      const double modulus = others[b]->material.modulus;
+      others[b]->field.evaluate(place, value, gradient);
+      for (std::size_t i = 0; i < place.size(); ++i) {
+        if (!(modulus * value[i] > most[i])) continue;
+        most[i] = modulus * value[i];
+        slope_of_most[i] = modulus * gradient[i];
+        by[i] = b;
+      }
+    }
+  }
+  [[nodiscard]] bool lost(std::size_t i) const { return most[i] > own[i]; }
+};
+
+/// The middle of a body, and places on the ways from there to where it ends: away from each of the others, and along all axes. None where that is not in it.
+std::vector<Vec3> places_in_body(PairPressure& pressure, int side, Thirds others) {
+  constexpr int kEnds = 8, kPlaces = 4;  // halvings; parts of a way
+  const Box box = pressure.field(side).surface_box();
+  const std::optional<implicit::CorePoint> core = pressure.field(side).core_point(box.centre());
+  const Vec3 middle = core ? core->point : box.centre();
+  if (!(pressure.value(side, middle) > 0.0)) return {};
+  std::vector<Vec3> way, place{middle};
+  for (Eigen::Index k = 0; k < 3; ++k) way.insert(way.end(), {Vec3(Vec3::Unit(k)), Vec3(-Vec3::Unit(k))});
+  for (const ContactBody* other : others) {
+    const Vec3 away = middle - other->field.surface_box().centre();
+    if (away.allFinite() && away.norm() > 0.0) way.push_back(away.normalized());
+  }
+  std::vector<double> end;
+  find_ends(pressure, side, middle, way, kEnds, end);
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    for (int k = 1; k < kPlaces; ++k) place.push_back(middle + (end[i] * k / kPlaces) * way[i]);
+  }
+  return place;
+}
+
+/// How far Sigma is from a place, as points on shells around it see it. @param lost  whether the place is   @param most  how far is looked [m]
+double free_around(PairPressure& pressure, int side, Thirds others, const Vec3& place, bool lost, double most) {
+  constexpr std::size_t kShells = 8, kAround = 26;  // to the faces, edges and corners of a cube
+  std::vector<Vec3> point;
+  for (std::size_t shell = 1; shell <= kShells; ++shell) {
+    for (const double x : {-1.0, 0.0, 1.0}) {
+      for (const double y : {-1.0, 0.0, 1.0}) {
+        for (const double z : {-1.0, 0.0, 1.0}) {
+          if (x != 0.0 || y != 0.0 || z != 0.0) point.push_back(place + (most * static_cast<double>(shell) / kShells) * Vec3(x, y, z).normalized());
+        }
+      }
+    }
+  }
+  const Presses there(pressure, side, others, point);
+  for (std::size_t i = 0; i < point.size(); ++i) {
+    if (there.own[i] > 0.0 && there.lost(i) != lost) return most * static_cast<double>(i / kAround) / kShells;
+  }
+  return most;
+}
+
 /// Of a convex body without end: only a half-space has one.
 std::optional<Apex> apex_at_infinity(PairPressure& pressure, int side, const Vec3& near) {
   const std::optional<implicit::CorePoint> core = pressure.field(side).core_point(near);
@@ -64,50 +132,32 @@ std::optional<Apex> find_apex(PairPressure& pressure, int side, const Vec3& from
   return apex_across(pressure, side, from, outward, box.extent().norm());
 }
 
-std::optional<Apex> find_shared_apex(PairPressure& pressure, int side, Thirds others, std::size_t& taker) {
-  constexpr int kEnds = 8, kPlaces = 4;  // halvings; parts of the way to where the body ends
+std::optional<Apex> find_shared_apex(PairPressure& pressure, int side, Thirds others, ApexRank rank, std::size_t& taker) {
   const implicit::FieldView& field = pressure.field(side);
   if (!field.convex()) return std::nullopt;
   const Box box = field.surface_box();
   if (!is_finite(box)) return apex_at_infinity(pressure, side, Vec3::Zero());
-  const std::optional<implicit::CorePoint> core = field.core_point(box.centre());
-  const Vec3 middle = core ? core->point : box.centre();
-  if (!(pressure.value(side, middle) > 0.0)) return std::nullopt;
-  // Away from each of the others, and along all axes.
-  std::vector<Vec3> way, place{middle};
-  for (Eigen::Index k = 0; k < 3; ++k) way.insert(way.end(), {Vec3(Vec3::Unit(k)), Vec3(-Vec3::Unit(k))});
-  for (const ContactBody* other : others) {
-    const Vec3 away = middle - other->field.surface_box().centre();
-    if (away.allFinite() && away.norm() > 0.0) way.push_back(away.normalized());
+  const std::vector<Vec3> place = places_in_body(pressure, side, others);
+  if (place.empty()) return std::nullopt;
+  const Presses there(pressure, side, others, place);
+  struct Free {
+    double clear;  // how far Sigma is [m], to first order, then as seen
+    std::size_t place;
+  };
+  const auto wider = [](const Free& one, const Free& other) { return one.clear > other.clear; };
+  std::vector<Free> free;
+  const double most = 0.25 * box.extent().norm();
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    const double first_order = std::abs(there.own[i] - there.most[i]) / (there.slope[i] - there.slope_of_most[i]).norm();
+    free.push_back({first_order < most ? first_order : most, i});
   }
-  std::vector<double> end;
-  find_ends(pressure, side, middle, way, kEnds, end);
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    for (int k = 1; k < kPlaces; ++k) place.push_back(middle + (end[i] * k / kPlaces) * way[i]);
-  }
-  const std::size_t n = place.size();
-  std::vector<double> own(n), most(n, 0.0), value(n);
-  std::vector<Vec3> apart(n), slope_of_most(n, Vec3::Zero()), slope(n);
-  std::vector<std::size_t> by(n, 0);
-  pressure.evaluate(side, place, own, apart);
-  for (std::size_t b = 0; b < others.size(); ++b) {
-    const double modulus = others[b]->material.modulus;
-    others[b]->field.evaluate(place, value, slope);
-    for (std::size_t i = 0; i < n; ++i) {
-      if (!(modulus * value[i] > most[i])) continue;
-      most[i] = modulus * value[i];
-      slope_of_most[i] = modulus * slope[i];
-      by[i] = b;
-    }
-  }
-  // To first order, how far Sigma is.
-  const auto clear = [&](std::size_t i) { return std::abs(own[i] - most[i]) / (apart[i] - slope_of_most[i]).norm(); };
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < n; ++i) {
-    if (clear(i) > clear(best)) best = i;
-  }
-  taker = by[best];
-  return Apex{.at = place[best], .lost = most[best] > own[best]};
+  std::stable_sort(free.begin(), free.end(), wider);
+  free.resize(std::min(free.size(), kLookedAt));
+  for (Free& f : free) f.clear = free_around(pressure, side, others, place[f.place], there.lost(f.place), f.clear);
+  std::stable_sort(free.begin(), free.end(), wider);
+  const std::size_t best = free[std::min(static_cast<std::size_t>(rank), free.size() - 1)].place;
+  taker = there.by[best];
+  return Apex{.at = place[best], .lost = there.lost(best)};
 }
 
 void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error, std::vector<Vec3>& point, std::vector<double>& volume) {

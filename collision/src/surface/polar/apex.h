@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -38,9 +39,12 @@ struct Swept {
 /// For a pair alone. @param from  a place of Sigma   @param outward  its normal out of the body   @return none of bodies that are not known to be convex
 [[nodiscard]] std::optional<Apex> find_apex(PairPressure& pressure, int side, const Vec3& from, const Vec3& outward);
 
+/// Which of the places that are farthest from Sigma.
+enum class ApexRank : std::uint8_t { Best, Next };
+
 /// For all pairs of a body whose space several others take: far from all their Sigma. @param others  that the body meets, in one order for all its pairs
 /// @param taker  receives the place in `others` of the one that the apex is lost to, if it is   @return none of bodies that are not known to be convex
-[[nodiscard]] std::optional<Apex> find_shared_apex(PairPressure& pressure, int side, Thirds others, std::size_t& taker);
+[[nodiscard]] std::optional<Apex> find_shared_apex(PairPressure& pressure, int side, Thirds others, ApexRank rank, std::size_t& taker);
 
 /// Gauss points more along a column where it may go through most of the body.
 inline constexpr int kMoreAcross = 2;

@@ -12,13 +12,16 @@
 namespace supple::collision {
 namespace {
 
-constexpr int kAcross = 3, kAlong = 4;    // Gauss points of a cell, each way, and of a piece of a column
+constexpr int kAcross = 3;                // Gauss points of a cell, each way
 constexpr double kPlacesInFeature = 8.0;  // on a column, to see the pieces of the region
 constexpr double kCellsInFeature = 2.0;   // each way, to see all of it
 constexpr double kFewestPlaces = 16.0, kMostPlaces = 512.0, kFewestCells = 4.0, kMostCells = 32.0;
 // What is smaller than a cell or than what lies between two places is a small share of the region: over the error, and over its root.
 constexpr double kPlacesOfError = 0.64, kCellsOfError = 0.5;
-constexpr std::size_t kMostLeaves = 4096;
+constexpr double kRough = 1e-2;  // error from which on fewer Gauss points along a piece of a column are enough
+constexpr int kAlong = 8, kAlongRough = 4;
+constexpr double kFine = 1e-4;  // error below which there may be more cells, and pieces are half as long
+constexpr std::size_t kMostLeaves = 4096, kMostFineLeaves = 16384;
 constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns, off by the square of what the last two values lie apart
 
 }  // namespace
@@ -56,6 +59,31 @@ void SqueezedRegion::find_margins(const Lost& lost, std::span<const Vec3> at) {
   for (std::size_t i = 0; i < n && !lost.equal; ++i) rest[i] -= own[i];
 }
 
+/// Where a margin may change its sign twice between places: where a parabola through three of one sign does.
+void SqueezedRegion::add_turn(std::size_t column, std::size_t margin, double at, double step, const std::array<double, 3>& value) {
+  const double sign = value[1] > 0.0 ? 1.0 : -1.0, before = sign * value[0], here = sign * value[1], after = sign * value[2];
+  const double bend = before - 2.0 * here + after, rise = 0.5 * (after - before);
+  if (!(before >= here && after >= here && bend > 0.0) || after <= 0.0 || !(here - 0.5 * rise * rise / bend < 0.0)) return;
+  turn_.push_back({column, margin, at, at - step * rise / bend, value[1], 0.0});
+}
+
+/// The changes on both sides of turns, where the margin has the other sign there indeed.
+void SqueezedRegion::find_pairs_of_changes(const Lost& lost, double step) {
+  place_.clear();
+  for (const Change& turn : turn_) place_.push_back(from_[turn.column] + turn.high * along_);
+  find_margins(lost, place_);
+  for (std::size_t i = 0; i < turn_.size(); ++i) {
+    const auto& [column, margin, at, turns_at, value, unused] = turn_[i];
+    const double there = margin_[margin * turn_.size() + i];
+    if ((there > 0.0) == (value > 0.0)) continue;
+    // The sign at the places around is that at the one between them; a secant needs no more.
+    const double low = turns_at < at ? at - step : at;
+    change_.push_back({column, margin, low, turns_at, value, there});
+    change_.push_back({column, margin, turns_at, low + step, there, value});
+  }
+  turn_.clear();
+}
+
 /// Where margins change their sign along the columns, by halving and a straight line through the last two values. Each by itself: pieces of the region
 /// may be thin where what bounds them is not.
 void SqueezedRegion::find_changes(const Lost& lost) {
@@ -74,12 +102,16 @@ void SqueezedRegion::find_changes(const Lost& lost) {
       const double* const margin = &margin_[j * n + c * row];
       positive_[c] += margin[0] > 0.0 ? 1 : 0;
       for (std::size_t k = 1; k < row; ++k) {
-        if ((margin[k] > 0.0) == (margin[k - 1] > 0.0)) continue;
         const double at = static_cast<double>(k) * step;
-        change_.push_back({c, j, at - step, at, margin[k - 1], margin[k]});
+        if ((margin[k] > 0.0) != (margin[k - 1] > 0.0)) {
+          change_.push_back({c, j, at - step, at, margin[k - 1], margin[k]});
+        } else if (k + 1 < row) {
+          add_turn(c, j, at, step, {margin[k - 1], margin[k], margin[k + 1]});
+        }
       }
     }
   }
+  find_pairs_of_changes(lost, step);
   const double enough = std::sqrt(kEndsOfError * lost.error) * length_;
   for (double gap = step; gap > enough; gap *= 0.5) {
     place_.clear();
@@ -142,8 +174,8 @@ void SqueezedRegion::measure_block(const Lost& lost, std::span<Cell> cells) {
 }
 
 void SqueezedRegion::add_piece(std::size_t column, double low, double high) {
-  const GaussRule& along = gauss_rule(kAlong);
-  const double parts = std::max(std::ceil((high - low) / feature_), 1.0), length = (high - low) / parts;
+  const GaussRule& along = gauss_rule(along_piece_);
+  const double parts = std::max(std::ceil((high - low) / longest_piece_), 1.0), length = (high - low) / parts;
   for (double k = 0.0; k < parts; ++k) {
     for (std::size_t j = 0; j < along.node.size(); ++j) {
       point_.push_back(from_[column] + (low + (k + along.node[j]) * length) * along_);
@@ -202,6 +234,8 @@ void SqueezedRegion::fill(const Lost& lost, const Box& overlap, const Vec3& acro
   origin_ = overlap.lower;
   length_ = overlap.extent()[axis];
   feature_ = lost.pressure.feature_size();
+  along_piece_ = lost.error < kRough ? kAlong : kAlongRough;
+  longest_piece_ = lost.error < kFine ? 0.5 * feature_ : feature_;
   std::array<double, 2> cells{}, width{};
   const double most = std::min(kMostCells, std::ceil(kCellsOfError / std::sqrt(lost.error)));
   for (std::size_t k = 0; k < 2; ++k) {
@@ -217,7 +251,8 @@ void SqueezedRegion::fill(const Lost& lost, const Box& overlap, const Vec3& acro
     for (double j = 0.0; j < cells[1]; ++j) split_.push_back({.corner = {i * width[0], j * width[1]}, .width = width});
   }
   measure(lost, split_);
-  for (quarter(lost); leaf_.size() < kMostLeaves && choose(lost.error);) quarter(lost);
+  const std::size_t most_leaves = lost.error < kFine ? kMostFineLeaves : kMostLeaves;
+  for (quarter(lost); leaf_.size() < most_leaves && choose(lost.error);) quarter(lost);
   const std::size_t begin = points.volume_point.size();
   const auto append = [](auto& to, const auto& from, const Cell& cell) {
     to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(cell.begin), from.begin() + static_cast<std::ptrdiff_t>(cell.end));

@@ -58,6 +58,8 @@ class SqueezedRegion {
   static std::size_t margins(const Lost& lost) { return lost.third.empty() ? 2 : 3; }
   void find_margins(const Lost& lost, std::span<const Vec3> at);
   void find_changes(const Lost& lost);
+  void add_turn(std::size_t column, std::size_t margin, double at, double step, const std::array<double, 3>& value);
+  void find_pairs_of_changes(const Lost& lost, double step);
   void measure(const Lost& lost, std::span<Cell> cells);
   void measure_block(const Lost& lost, std::span<Cell> cells);
   void add_piece(std::size_t column, double low, double high);
@@ -67,10 +69,13 @@ class SqueezedRegion {
   Vec3 origin_, along_;
   std::array<Vec3, 2> across_;
   double length_ = 0.0, feature_ = 0.0;  // of columns, of the bodies [m]
+  double longest_piece_ = 0.0;           // of columns, that Gauss points are laid on [m]
+  int along_piece_ = 0;                  // of these points
   std::vector<Vec3> from_;    // where columns begin
   std::vector<double> area_;  // that they stand for [m^2]
   std::vector<std::size_t> positive_;  // margins of columns where they begin
   std::vector<Change> change_;         // sorted along each column
+  std::vector<Change> turn_;           // from a place to where the margin turns towards the other sign
   std::vector<Vec3> place_, point_;
   std::vector<double> margin_, third_, value_, volume_;
   std::vector<Cell> leaf_, split_, quarter_;

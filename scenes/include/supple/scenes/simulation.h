@@ -152,6 +152,8 @@ class Simulation {
   [[nodiscard]] const std::vector<Mesh>& meshes();
   /// Contacts of the current state between `bodies()`, the ground being the last. Kept until the next step.
   [[nodiscard]] const collision::ContactSurface& contacts();
+  /// What the energies of contacts may be off by [J], shape [contacts().summary] (collision/contact_surface.h).
+  [[nodiscard]] std::vector<double> energy_estimates();
   /// Bodies of the contact stage, the fixed ones last; valid until the next step.
   [[nodiscard]] std::span<const collision::ContactBody> contact_bodies();
   /// Total force on body A of each contact, damping and friction included [N], shape [contacts().summary].
