@@ -116,6 +116,7 @@
     const mesh = new T.Mesh(new T.BufferGeometry(), material);
     mesh.castShadow = mesh.receiveShadow = true;
     mesh.frustumCulled = false;
+    mesh.visible = false;  // three.js gives a material flat shading for good where its first geometry has no normals
     scene.add(mesh);
     return { look, mesh, material, wanted: true, drawn: null };
   });
@@ -533,10 +534,11 @@
     byId("scrub").addEventListener("input", () => { pause(); showFrame(Number(byId("scrub").value)); });
     window.addEventListener("hashchange", followAddress);
     document.addEventListener("keydown", (event) => {
-      if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName) && event.key === " ") return;
+      const slides = event.target.type === "range";  // a slider moves by arrows, but has no use for space
+      if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName) && event.key === " " && !slides) return;
       const to = { ArrowLeft: shown - 1, ArrowRight: shown + 1, Home: 0, End: frames.length - 1 }[event.key];
       if (event.key === " ") { playing ? pause() : play(); event.preventDefault(); }
-      if (to !== undefined && event.target.type !== "range") { pause(); showFrame(to); }
+      if (to !== undefined && !slides) { pause(); showFrame(to); }
     });
     if (head.follows) { await follow(); return; }
     await addFrames(fromBase64(byId("frames").textContent));

@@ -145,6 +145,25 @@ class ViewPage(unittest.TestCase):
             self.assertEqual(frame(), last)
             page.press("ArrowLeft")
             self.assertEqual(frame(), last - 1)
+            for _ in page.drag("#scrub", [0.02]):  # leaves the focus on the slider
+                pass
+            page.press(" ")
+            page.wait(f"document.body.dataset.frame == '{last}'")  # it plays
+
+    @unittest.skipUnless(BROWSER, "no browser (apt-get install chromium)")
+    def test_draws_a_frame_the_same_whatever_was_shown_before(self):
+        last = len(self.frames)
+        free = [not frame["pairs"] for frame in self.frames]
+        self.assertTrue(free[0] and not all(free))
+        with Browser(f"file://{self.page}") as page:
+            page.wait(f"document.body && document.body.dataset.ready == '{last}'")
+            page.press("Home")
+            first = page.picture()
+            for _ in range(free.index(False)):
+                page.press("ArrowRight")
+            self.assertFalse(page.picture() == first)
+            page.press("Home")
+            self.assertTrue(page.picture() == first)
 
 
 class FollowedRun(unittest.TestCase):
