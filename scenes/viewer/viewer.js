@@ -103,7 +103,6 @@
   sun.castShadow = true;
   sun.shadow.mapSize.set(2048, 2048);
   sun.shadow.bias = -0.0005;
-  sun.shadow.normalBias = 0.02;
   scene.add(sun, sun.target, new T.HemisphereLight(0xe8f0ff, 0xb8a890, 1.5));
   const srgb = (c) => new T.Color().setRGB(c[0], c[1], c[2], T.SRGBColorSpace);
   const css = (c) => `rgb(${c.map((v) => Math.round(255 * v)).join(",")})`;
@@ -166,6 +165,7 @@
     const middle = limits.low.clone().add(limits.high).multiplyScalar(0.5);
     limits.size = Math.max(limits.high.distanceTo(limits.low), 1e-6);
     sun.target.position.copy(middle);
+    sun.shadow.normalBias = 6 * limits.size / sun.shadow.mapSize.width;  // three of the map's pixels
     sun.position.copy(middle).addScaledVector(new T.Vector3(...head.light).normalize(), -2 * limits.size);
     const box = sun.shadow.camera;
     box.left = box.bottom = -limits.size;
@@ -189,12 +189,20 @@
     scene.add(ground);
   }
 
+  let lens = 0.6;  // vertical angle of the scene's camera [rad]
+  /** The film's picture fits into the view, also where that is narrower. */
+  function fitLens() {
+    const half = Math.tan(0.5 * lens) * Math.max(1, head.aspect / camera.aspect);
+    camera.fov = 2 * Math.atan(half) * 180 / Math.PI;
+    camera.updateProjectionMatrix();
+  }
+
   function goHome() {
     const [from, to, angle] = frames[Math.max(shown, 0)].camera;
     camera.position.fromArray(from);
     controls.target.fromArray(to);
-    camera.fov = angle * 180 / Math.PI;
-    camera.updateProjectionMatrix();
+    lens = angle;
+    fitLens();
     controls.update();
   }
 
@@ -491,7 +499,7 @@
     const { clientWidth, clientHeight } = byId("stage");
     renderer.setSize(clientWidth, clientHeight, false);
     camera.aspect = clientWidth / Math.max(clientHeight, 1);
-    camera.updateProjectionMatrix();
+    fitLens();
     drawPlots();
     draw();
   }
