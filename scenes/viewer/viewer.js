@@ -532,7 +532,7 @@
 
   async function start() {
     document.title = byId("title").textContent = head.title || head.name;
-    byId("summary").textContent = `${head.name}, ${head.meshes.length} objects, ${head.frame_rate} frames per second`;
+    byId("summary").textContent = `${head.name}, ${head.meshes.length} object${head.meshes.length === 1 ? "" : "s"}, ${head.frame_rate} frames per second`;
     controls.addEventListener("change", draw);
     new ResizeObserver(resize).observe(byId("stage"));
     for (const id of ["pressure", "forces", "points", "particles", "wires"]) byId(id).addEventListener("change", () => showFrame(shown));
