@@ -119,7 +119,8 @@ def _run_of(path):
 def _material(run, number):
     look = run.json["materials"][number]
     material = bpy.data.materials.new(look["name"])
-    material.use_nodes = True
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True  # as materials of later versions always do
     shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
     values = look["pbrMetallicRoughness"]
     shader.inputs["Base Color"].default_value = values["baseColorFactor"]

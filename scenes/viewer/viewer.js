@@ -103,7 +103,6 @@
   sun.castShadow = true;
   sun.shadow.mapSize.set(2048, 2048);
   sun.shadow.bias = -0.0005;
-  sun.shadow.normalBias = 0.02;
   scene.add(sun, sun.target, new T.HemisphereLight(0xe8f0ff, 0xb8a890, 1.5));
   const srgb = (c) => new T.Color().setRGB(c[0], c[1], c[2], T.SRGBColorSpace);
   const css = (c) => `rgb(${c.map((v) => Math.round(255 * v)).join(",")})`;
@@ -116,6 +115,7 @@
     const mesh = new T.Mesh(new T.BufferGeometry(), material);
     mesh.castShadow = mesh.receiveShadow = true;
     mesh.frustumCulled = false;
+    mesh.visible = false;  // three.js gives a material flat shading for good where its first geometry has no normals
     scene.add(mesh);
     return { look, mesh, material, wanted: true, drawn: null };
   });
@@ -165,6 +165,7 @@
     const middle = limits.low.clone().add(limits.high).multiplyScalar(0.5);
     limits.size = Math.max(limits.high.distanceTo(limits.low), 1e-6);
     sun.target.position.copy(middle);
+    sun.shadow.normalBias = 6 * limits.size / sun.shadow.mapSize.width;  // three of the map's pixels
     sun.position.copy(middle).addScaledVector(new T.Vector3(...head.light).normalize(), -2 * limits.size);
     const box = sun.shadow.camera;
     box.left = box.bottom = -limits.size;
@@ -188,12 +189,20 @@
     scene.add(ground);
   }
 
+  let lens = 0.6;  // vertical angle of the scene's camera [rad]
+  /** The film's picture fits into the view, also where that is narrower. */
+  function fitLens() {
+    const half = Math.tan(0.5 * lens) * Math.max(1, head.aspect / camera.aspect);
+    camera.fov = 2 * Math.atan(half) * 180 / Math.PI;
+    camera.updateProjectionMatrix();
+  }
+
   function goHome() {
     const [from, to, angle] = frames[Math.max(shown, 0)].camera;
     camera.position.fromArray(from);
     controls.target.fromArray(to);
-    camera.fov = angle * 180 / Math.PI;
-    camera.updateProjectionMatrix();
+    lens = angle;
+    fitLens();
     controls.update();
   }
 
@@ -490,7 +499,7 @@
     const { clientWidth, clientHeight } = byId("stage");
     renderer.setSize(clientWidth, clientHeight, false);
     camera.aspect = clientWidth / Math.max(clientHeight, 1);
-    camera.updateProjectionMatrix();
+    fitLens();
     drawPlots();
     draw();
   }
@@ -523,7 +532,7 @@
 
   async function start() {
     document.title = byId("title").textContent = head.title || head.name;
-    byId("summary").textContent = `${head.name}, ${head.meshes.length} objects, ${head.frame_rate} frames per second`;
+    byId("summary").textContent = `${head.name}, ${head.meshes.length} object${head.meshes.length === 1 ? "" : "s"}, ${head.frame_rate} frames per second`;
     controls.addEventListener("change", draw);
     new ResizeObserver(resize).observe(byId("stage"));
     for (const id of ["pressure", "forces", "points", "particles", "wires"]) byId(id).addEventListener("change", () => showFrame(shown));
@@ -533,10 +542,11 @@
     byId("scrub").addEventListener("input", () => { pause(); showFrame(Number(byId("scrub").value)); });
     window.addEventListener("hashchange", followAddress);
     document.addEventListener("keydown", (event) => {
-      if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName) && event.key === " ") return;
+      const slides = event.target.type === "range";  // a slider moves by arrows, but has no use for space
+      if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName) && event.key === " " && !slides) return;
       const to = { ArrowLeft: shown - 1, ArrowRight: shown + 1, Home: 0, End: frames.length - 1 }[event.key];
       if (event.key === " ") { playing ? pause() : play(); event.preventDefault(); }
-      if (to !== undefined && event.target.type !== "range") { pause(); showFrame(to); }
+      if (to !== undefined && !slides) { pause(); showFrame(to); }
     });
     if (head.follows) { await follow(); return; }
     await addFrames(fromBase64(byId("frames").textContent));

@@ -8,6 +8,8 @@ import subprocess
 import tempfile
 import time
 
+import numpy as np
+
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 OPTIONS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars", "--disable-background-networking"]
 SECONDS = 120  # for an answer, on a busy machine
@@ -97,6 +99,15 @@ class Browser:
     def press(self, key):
         self.call("Input.dispatchKeyEvent", type="keyDown", key=key, code=key)
         self.call("Input.dispatchKeyEvent", type="keyUp", key=key, code=key)
+
+    def pixels(self, selector, width, height):
+        """RGB values of a canvas that is drawn by WebGL, scaled down, shape (height, width, 3)."""
+        rgba = self.value(f"""(() => {{
+            const small = Object.assign(document.createElement("canvas"), {{ width: {width}, height: {height} }}).getContext("2d");
+            small.drawImage(document.querySelector({json.dumps(selector)}), 0, 0, {width}, {height});
+            return Array.from(small.getImageData(0, 0, {width}, {height}).data);
+        }})()""")
+        return np.array(rgba, np.float64).reshape(height, width, 4)[:, :, :3]
 
     def picture(self):
         """A PNG of the page."""

@@ -145,6 +145,56 @@ class ViewPage(unittest.TestCase):
             self.assertEqual(frame(), last)
             page.press("ArrowLeft")
             self.assertEqual(frame(), last - 1)
+            for _ in page.drag("#scrub", [0.02]):  # leaves the focus on the slider
+                pass
+            page.press(" ")
+            page.wait(f"document.body.dataset.frame == '{last}'")  # it plays
+
+    @unittest.skipUnless(BROWSER, "no browser (apt-get install chromium)")
+    def test_draws_a_frame_the_same_whatever_was_shown_before(self):
+        last = len(self.frames)
+        free = [not frame["pairs"] for frame in self.frames]
+        self.assertTrue(free[0] and not all(free))
+        with Browser(f"file://{self.page}") as page:
+            page.wait(f"document.body && document.body.dataset.ready == '{last}'")
+            page.press("Home")
+            first = page.picture()
+            for _ in range(free.index(False)):
+                page.press("ArrowRight")
+            self.assertFalse(page.picture() == first)
+            page.press("Home")
+            self.assertTrue(page.picture() == first)
+
+    def page_of(self, scene):
+        run_of(scene, self.folder / "other")
+        return supple.view(scene, self.folder / "other", cells=24)
+
+    @unittest.skipUnless(BROWSER, "no browser (apt-get install chromium)")
+    def test_shows_all_of_the_film_beside_its_panel(self):
+        """Balls at the sides of a wide picture are seen whole where the window is narrow."""
+        scene = supple.Scene({"duration": 0.25, "frame_rate": 8, "camera": {"from": [0, -5, 0], "look_at": [0, 0, 0], "field_of_view_deg": 30},
+                              "output": {"images": {"size": [1600, 600]}}, "objects": [
+            {"name": name, "particles": {"arrange": "single", "at": [x, 0, 0], "mass": 1}, "colour": [1, 0, 0],
+             "skeleton": [{"shape": "point", "kernel": {"type": "wyvill", "radius": 0.5}}]} for name, x in (("left", -3), ("right", 3))]})
+        with Browser(f"file://{self.page_of(scene)}", 900, 640) as page:
+            page.wait("document.body && document.body.dataset.ready == '3'")
+            colour = page.pixels("#view", 114, 120)
+        red = colour[:, :, 0] > colour[:, :, 1] + 60
+        self.assertFalse(red[:, 0].any() or red[:, -1].any())
+        self.assertTrue(red[:, :57].any() and red[:, 57:].any())
+
+    @unittest.skipUnless(BROWSER, "no browser (apt-get install chromium)")
+    def test_draws_shadows_at_any_size(self):
+        pictures = []
+        for size in (1e-3, 1.0, 100.0):
+            scene = supple.Scene({"duration": 0.25, "frame_rate": 8, "camera": {"from": [0, -4 * size, 2 * size], "look_at": [0, 0, 0]},
+                                  "ground": {"height": -size}, "objects": [
+                {"name": "ball", "particles": {"arrange": "single", "mass": 1}, "skeleton": [{"shape": "point", "kernel": {"type": "wyvill", "radius": size}}]}]})
+            with Browser(f"file://{self.page_of(scene)}") as page:
+                page.wait("document.body && document.body.dataset.ready == '3'")
+                pictures.append(page.pixels("#view", 134, 120))
+        self.assertLess(abs(pictures[0] - pictures[1]).max(), 12)
+        self.assertLess(abs(pictures[2] - pictures[1]).max(), 12)
 
 
 class FollowedRun(unittest.TestCase):

@@ -288,6 +288,9 @@ TEST_F(ExpandedScene, RefusesRepetitionsThatAreTooMany) {
   EXPECT_EQ(expected("1.5"), "expected a whole number from 0 to 200000");
   EXPECT_EQ(expected("2 m"), "expected a whole number from 0 to 200000");
   EXPECT_EQ(expected("{i: 200000, j: 200000, k: 200000}"), "expected at most 200000 nodes, every repetition counted");
+  const Fault name = faults("schema: 1\nduration: 1\nobjects:\n  - {repeat: {count: 4, index: k}, name: \"a${k}\", particles: {arrange: single, mass: 1}}\n")[0];
+  EXPECT_EQ(name.key, "objects[0].repeat.index");
+  EXPECT_EQ(name.hint, "a mapping gives each index its count, as 'repeat: {i: 3, j: 4}'");
 }
 
 TEST_F(ExpandedScene, SaysThatExpressionsInFlowCollectionsNeedQuotes) {

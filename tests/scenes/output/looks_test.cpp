@@ -274,6 +274,7 @@ objects:
     double most = 0.0;
     for (std::size_t v = 0; v < value.size(); ++v) {
       const double pressure = column("pressure")[v];
+      if (mesh.position[v].z() < -0.3) continue;  // in the ground, which does not cut the surface
       most = std::max(most, pressure);
       // Vertices are roots to 1e-10 in units of F.
       const double expected = column("contact")[v] > 0.0 ? std::max(0.0, modulus[i] * value[v]) : 0.0;
@@ -283,6 +284,48 @@ objects:
     EXPECT_LE(most, largest * (1.0 + 1e-9));
     EXPECT_GE(most, largest - 6.0 / 0.64 * 2e3 * simulation.cell() * simulation.cell());
   }
+}
+
+TEST(Pressure, OnAFixedBodyIsThatOfTheContactSurfaceOverTheVertex) {
+  // The surface is not cut there: of a ball in the ground and in a plane, a vertex shows the pressure where both are equal on the way out.
+  constexpr double kBallModulus = 4e3, kGroundSlope = 2e4, kPlaneSlope = 5e4;  // [Pa], [Pa/m], [Pa/m]
+  Simulation simulation(parse_scene(R"(
+schema: 1
+duration: 1 s
+ground: {height: -0.3, modulus: 1e4, slope: 2}
+obstacles:
+  - {name: wall, shape: plane, at: [0.35, 0, 0], normal: [-1, 0, 0], modulus: 1e4, slope: 5}
+objects:
+  - name: ball
+    particles: {arrange: single, at: [0, 0, 0], mass: 0.5}
+    skeleton: [{shape: point, kernel: {type: wyvill, radius: 0.8}}]
+    contact: {modulus: 4e3}
+    look: {colour_by: pressure, range: [0, 1000]}
+)", "test.yaml", "."));
+  ASSERT_EQ(simulation.contacts().summary.size(), 2u);
+  const Mesh& mesh = simulation.meshes()[0];
+  const std::vector<double>& pressure = std::find_if(mesh.columns.begin(), mesh.columns.end(), [](const auto& c) { return c.name == "pressure"; })->values;
+  double most = 0.0, largest = 0.0;
+  for (const auto& s : simulation.contacts().summary) largest = std::max(largest, s.largest_pressure);
+  for (std::size_t v = 0; v < pressure.size(); ++v) {
+    const Vec3& x = mesh.position[v];
+    const double below = -0.3 - x.z(), behind = x.x() - 0.35;
+    most = std::max(most, pressure[v]);
+    if (below <= 0.0 && behind <= 0.0) {
+      EXPECT_EQ(pressure[v], 0.0) << x.transpose();
+    } else {  // the ball's pressure at the place where the fixed body's is that of the vertex, if it is that body's
+      const Vec3 over_ground = x + (below - pressure[v] / kGroundSlope) * Vec3::UnitZ();
+      const Vec3 before_wall = x - (behind - pressure[v] / kPlaneSlope) * Vec3::UnitX();
+      std::array<double, 2> value{};
+      simulation.fields()[0].evaluate(std::array{over_ground, before_wall}, value);
+      const double deepest = std::max(below * kGroundSlope, behind * kPlaneSlope);
+      const double error = std::min(below > 0.0 ? std::abs(kBallModulus * value[0] - pressure[v]) : deepest, behind > 0.0 ? std::abs(kBallModulus * value[1] - pressure[v]) : deepest);
+      EXPECT_LE(error, 1e-6 * deepest + 1e-9) << x.transpose() << ": " << pressure[v];
+    }
+  }
+  // Within a cell of the peak the pressure falls by less than the ball's second derivative over F, 6 / R^2, says.
+  EXPECT_LE(most, largest * (1.0 + 1e-6));
+  EXPECT_GE(most, largest - 6.0 / 0.64 * kBallModulus * simulation.cell() * simulation.cell());
 }
 
 TEST_F(Looks, SpeedShowsTheColourOfItsValue) {

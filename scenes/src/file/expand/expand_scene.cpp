@@ -311,13 +311,16 @@ std::vector<std::pair<Expansion::Index, std::size_t>> Expansion::counts_of(const
       const Value value = node.kind == Node::Kind::Scalar ? value_of(node) : Value{.dimension = {}, .is_text = true, .text = {}};
       const bool whole = !value.is_text && value.dimension == Dimension{} && value.number == std::floor(value.number) && value.number >= 0.0 &&
                          value.number <= static_cast<double>(kMostNodes);
-      if (!whole) throw ExpressionFault{"expected a whole number from 0 to " + std::to_string(kMostNodes), node.kind == Node::Kind::Scalar ? value.spelt() : node.described(), ""};
+      if (!whole) {
+        throw ExpressionFault{"expected a whole number from 0 to " + std::to_string(kMostNodes), node.kind == Node::Kind::Scalar ? value.spelt() : node.described(),
+                              value.is_text ? "a mapping gives each index its count, as 'repeat: {i: 3, j: 4}'" : ""};
+      }
       const auto same = [&](const auto& other) { return other.first == name; };
       if (const auto fault = fault_of_name(name)) throw *fault;
       if (std::any_of(variables_.begin(), variables_.end(), same)) throw ExpressionFault{"expected an index that is no variable", '\'' + shown(name) + '\'', ""};
       counts.push_back({{name, 0.0}, static_cast<std::size_t>(value.number)});
     } catch (const ExpressionFault& fault) {
-      fail(mark, key, fault);
+      fail(mark, &node == &repeat ? key : key + '.' + shown(name), fault);
       counts.push_back({{name, 0.0}, 1});  // what uses the index has no fault of its own
     }
   };

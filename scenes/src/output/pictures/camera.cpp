@@ -55,13 +55,17 @@ std::span<const CameraDesc> cameras_of(const Scene& scene) {
   return scene.cameras;
 }
 
+double aspect_of(const Scene& scene) {
+  const std::vector<int> size = scene.output.images ? scene.output.images->size : ImagesDesc{}.size;
+  return static_cast<double>(size.at(0)) / size.at(1);
+}
+
 bool is_open(const CameraDesc& desc) { return desc.keys.empty() && !(desc.from && desc.look_at); }
 
 std::vector<CameraDesc> placed_cameras(const Scene& scene, const Box& seen) {
   constexpr double kShare = 0.8;
   const Vec3 usual(0.4, -2.6, 1.4);
-  const std::vector<int> size = scene.output.images ? scene.output.images->size : ImagesDesc{}.size;
-  const double aspect = static_cast<double>(size.at(0)) / size.at(1);
+  const double aspect = aspect_of(scene);
   const std::span<const CameraDesc> all = cameras_of(scene);
   std::vector<CameraDesc> cameras(all.begin(), all.end());
   for (CameraDesc& camera : cameras) {

@@ -16,6 +16,9 @@ namespace supple::scenes {
 /// leaves them at the origin. @param seen  bounding box of the initial surfaces [m]
 [[nodiscard]] std::vector<CameraDesc> placed_cameras(const Scene& scene, const Box& seen);
 
+/// Width over height of the pictures.
+[[nodiscard]] double aspect_of(const Scene& scene);
+
 /// Whether a camera has no position yet.
 [[nodiscard]] bool is_open(const CameraDesc& desc);
 

@@ -224,9 +224,7 @@ void ScenePictures::add(render::Item item, std::string name) {
 
 std::function<bool(const Box&)> shown_by_cameras(const Scene& scene, const Model& model, double time) {
   if (scene.render.renderer != RendererName::Gl) return {};
-  const std::vector<int> size = picture_size_of(scene);
-  const double aspect = static_cast<double>(size.at(0)) / size.at(1);
-  return [cameras = cameras_at(scene, model, time), aspect, light = scene.light](const Box& box) {
+  return [cameras = cameras_at(scene, model, time), aspect = aspect_of(scene), light = scene.light](const Box& box) {
     return std::any_of(cameras.begin(), cameras.end(), [&](const render::Camera& camera) {
       return may_show(camera, aspect, light.direction, light.softness, box);
     });

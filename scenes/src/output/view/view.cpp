@@ -132,7 +132,8 @@ std::string RunView::head(bool follows) const {
   for (Json& solid : solids_of(scene)) meshes.push_back(std::move(solid));
   Json json{{"name", scene_name(scene)}, {"title", scene.title}, {"frame_rate", scene.frame_rate}, {"frame_count", scene.frame_count()},
             {"follows", follows}, {"meshes", std::move(meshes)}, {"light", json_of(scene.light.direction)},
-            {"background", {json_of(scene.background.top), json_of(scene.background.bottom)}}, {"up", json_of(model.cameras.front().up)}};
+            {"background", {json_of(scene.background.top), json_of(scene.background.bottom)}}, {"up", json_of(model.cameras.front().up)},
+            {"aspect", aspect_of(scene)}};
   if (scene.ground && scene.ground->visible) json["ground"] = {{"height", scene.ground->height}, {"colour", json_of(scene.ground->colour)}};
   return page_text(json);
 }
