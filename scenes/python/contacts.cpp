@@ -234,6 +234,10 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
            "error  required relative error, from 1e-10 to 0.1; error_estimate of the answer is the estimate of the error that was "
            "reached.")
       .def(
+          "energy_estimates",
+          [](Handle& h) { return own(h.use([](scenes::Simulation& s) { return s.energy_estimates(); })); },
+          "What the energies of contacts() may be off by [J], shape (pairs,). It takes two to ten times as long as the contacts.")
+      .def(
           "contact_capacity",
           [](Handle& h, const std::string& a, const std::string& b) {
             return h.use([&](scenes::Simulation& s) {

@@ -94,6 +94,13 @@ class TwoBodies(unittest.TestCase):
             np.testing.assert_allclose(contact.centre_of_pressure, 0, atol=1e-8)
             np.testing.assert_allclose(contact.elastic_force / np.linalg.norm(contact.elastic_force), -across / 0.15, atol=2e-8)
 
+    def test_tell_what_their_energies_may_be_off_by(self):
+        simulation = pressed()
+        estimates, pairs = simulation.energy_estimates(), simulation.contacts()
+        self.assertEqual(estimates.shape, (len(pairs),))
+        self.assertTrue(all(0 < estimate < 1e-2 * pair.energy for estimate, pair in zip(estimates, pairs, strict=True)))
+        self.assertEqual(supple.Simulation(two_drops()).energy_estimates().shape, (0,))
+
     def test_can_hold_so_much(self):
         simulation = pressed()
         capacity = simulation.contact_capacity("left", "right")
