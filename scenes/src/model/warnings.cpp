@@ -208,7 +208,8 @@ void add_idle(const Scene& scene, const Model& model, std::vector<std::string>& 
   idle(flat && d.bulge_literal, "contact.bulge_literal", "'bulge' is 0");
   for (std::size_t k = 0; k < scene.pairs.size(); ++k) {
     const PairDesc& pair = scene.pairs[k];
-    idle(!pair.collide && !pair.friction && !pair.dissipation && !pair.restitution, "pairs[" + std::to_string(k) + ']',
+    const bool always = pair.from == 0.0 && std::isinf(pair.until);
+    idle(always && !pair.collide && !pair.friction && !pair.dissipation && !pair.restitution, "pairs[" + std::to_string(k) + ']',
          "it has no key beside 'objects'");
   }
   const auto& meshes = scene.output.mesh;

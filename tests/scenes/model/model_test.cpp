@@ -300,6 +300,7 @@ TEST(Warnings, TellOfKeysThatChangeNothing) {
 
   expect(warnings_of(rough + "pairs: [{objects: [a, ground], collide: true}, {objects: [b, a]}]\n"),
          {"pairs[1]: it has no effect, as it has no key beside 'objects'"});
+  expect(warnings_of(rough + "pairs: [{objects: [a, ground], until: 0.5 s}, {objects: [b, a], from: 0.1 s}]\n"), {});
 
   const std::string line = "arrange: line, count: 3, spacing: 0.1";
   const std::vector<std::string> whole{"objects.a.contact.self: it has no effect, as no parts of the object can touch each other: they blend or are bonded"};
