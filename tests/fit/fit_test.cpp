@@ -54,6 +54,15 @@ TEST(Fit, DoesNotDependOnThreads) {
   EXPECT_EQ(one.report.to_data.largest, three.report.to_data.largest);
 }
 
+/// A corner below is moved to above all others, through the faces there.
+TEST(Fit, LeavesAnOutwardMeshWhoseHighestCornerIsTurnedAsItIs) {
+  Mesh mesh = test::torus(0.3, 0.1, 10, 6);
+  mesh.position[59] = Vec3(0.282476, -0.215035, 0.332398);
+  const FittedObject object = fit(test::saved(mesh, "turned"), {.error = 0.1, .particles = 5, .primitives = 8});
+  EXPECT_FALSE(object.report.repair.turned);
+  EXPECT_NEAR(object.report.volume, inspect(mesh).volume, 1e-6 * inspect(mesh).volume);
+}
+
 TEST(Fit, ClosesSmallHolesAndTurnsTriangles) {
   Mesh mesh = test::octahedral_sphere(1.0, 4);
   mesh.triangle.resize(mesh.triangle.size() - 3);

@@ -52,6 +52,9 @@ TEST(FitRefuses, SurfacesWithoutInside) {
             "open.off: expected holes whose closing adds less than a tenth of the area, found 1 hole, the largest part at (1, 0, 0); close them in a mesh editor, or fit a surface without inside by --kind shell");
   EXPECT_EQ(message("flat.off", off("0 0 0\n1 0 0\n1 1 0\n0 1 0\n", "3 0 1 2\n3 0 2 3\n3 1 0 3\n3 1 3 2\n")),
             "flat.off: expected a mesh that encloses a volume, found a flat one; fit a surface without inside by --kind shell");
+  const std::string plate = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 0.001\n1 0 0.001\n1 1 0.001\n0 1 0.001\n";
+  EXPECT_EQ(message("plate.off", off(plate, "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n")),
+            "plate.off: expected a mesh that encloses a volume, found one so thin that points 0.2605 % of the diagonal apart miss it; fit a surface without inside by --kind shell");
 }
 
 TEST(FitRefuses, ThreeTrianglesAtAnEdge) {

@@ -330,11 +330,19 @@ void hang(FittedObject& object, const Skeleton& skeleton, const Packing& packing
   std::stable_sort(object.primitives.begin(), object.primitives.end(), [](const auto& a, const auto& b) { return a.particle < b.particle; });
 }
 
-/// Particles, bonds and their sections of a solid; lengths over the diagonal.
-Packing add_solid(FittedObject& object, const Skeleton& skeleton, const Data& data, const FitOptions& options, const Executor& executor) {
+/// Points of a lattice inside a solid, enough for all its particles; lengths over the diagonal.
+/// @throws Error{Scene} where there are none: in a plate that is thinner than their step
+Surroundings fill_solid(const std::filesystem::path& file, const Data& data, double volume, int particles, const Executor& executor) {
   constexpr double kPointsOfShare = 40.0, kLeastPoints = 20000.0;
-  const double points = std::max(kPointsOfShare * options.particles, kLeastPoints), volume = inspect(data.mesh).volume, diagonal = object.report.diagonal;
-  const Surroundings lattice = sample_surroundings(data.mesh, data.tree, math::pow(volume / points, 1.0 / 3.0), executor);
+  const double points = std::max(kPointsOfShare * particles, kLeastPoints);
+  Surroundings lattice = sample_surroundings(data.mesh, data.tree, math::pow(volume / points, 1.0 / 3.0), executor);
+  if (lattice.inside.empty()) refuse(file, "expected a mesh that encloses a volume", "one so thin that points " + short_number(100.0 * lattice.step) + " % of the diagonal apart miss it", "fit a surface without inside by --kind shell");
+  return lattice;
+}
+
+/// Particles, bonds and their sections of a solid; lengths over the diagonal.
+Packing add_solid(FittedObject& object, const Skeleton& skeleton, const Data& data, const Surroundings& lattice, const FitOptions& options, const Executor& executor) {
+  const double diagonal = object.report.diagonal;
   Packing packing = pack_inside(lattice, options.particles, executor);
   for (const double area : bond_sections(data.mesh, lattice, packing, options.material.poissons_ratio)) object.sections.push_back(diagonal * diagonal * area);
   hang(object, skeleton, packing, lattice.inside, diagonal);
@@ -418,9 +426,11 @@ FittedObject fit(const std::filesystem::path& file, const FitOptions& asked) {
   const double spacing = math::pow(volume / options.particles, 1.0 / 3.0);
   constexpr double kLargestBall = 1.25;  // of the spacing: a primitive moves with one particle
   const Data data(mesh, std::min(0.5, kLargestBall * spacing), options.error, executor);
+  const bool solid = options.kind == Kind::Solid;
+  const Surroundings lattice = solid ? fill_solid(file, data, volume, options.particles, executor) : Surroundings{};
   const Skeleton skeleton = fit_skeleton(data, options, executor);
   object.material = options.material;
-  const Packing packing = options.kind == Kind::Solid ? add_solid(object, skeleton, data, options, executor) : add_shell(object, skeleton, middle_surface, options, executor);
+  const Packing packing = solid ? add_solid(object, skeleton, data, lattice, options, executor) : add_shell(object, skeleton, middle_surface, options, executor);
   const Vec3 middle = centre_of_mass(mesh);
   object.origin = frame.middle + frame.diagonal * middle;
   object.spacing = frame.diagonal * spacing;

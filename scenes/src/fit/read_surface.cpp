@@ -182,11 +182,12 @@ Soup read_data(const std::filesystem::path& file, const FitOptions& options, Rep
   return soup_of(surface_through_points(file, options.error, repair));
 }
 
-/// @pre closed
-bool is_flat(const SurfaceMesh& mesh) {
+/// What a closed mesh encloses: less than 0 where its faces are turned inward, 0 where it is as good as flat. CGAL's own test of the orientation looks at the
+/// highest vertex alone, and errs where faces go through each other there.
+double enclosed_volume(const SurfaceMesh& mesh) {
   constexpr double kLeast = 1e-6;
-  const double area = pmp::area(mesh);
-  return !(std::abs(pmp::volume(mesh)) > kLeast * area * std::sqrt(area));
+  const double area = pmp::area(mesh), volume = pmp::volume(mesh);
+  return std::abs(volume) > kLeast * area * std::sqrt(area) ? volume : 0.0;
 }
 
 }  // namespace
@@ -203,9 +204,10 @@ Mesh read_surface(const std::filesystem::path& file, const FitOptions& options, 
   const bool solid = options.kind == Kind::Solid;
   if (solid) close_holes(file, mesh, repair);
   keep_pieces(file, mesh, options.pieces, repair);
-  const bool flat = CGAL::is_closed(mesh) && is_flat(mesh);  // such a mesh has no outside
-  if (solid && flat) refuse(file, "expected a mesh that encloses a volume", "a flat one", "fit a surface without inside by --kind shell");
-  repair.turned = CGAL::is_closed(mesh) && !flat && !pmp::is_outward_oriented(mesh);
+  const bool closed = CGAL::is_closed(mesh);
+  const double volume = closed ? enclosed_volume(mesh) : 0.0;
+  if (solid && closed && volume == 0.0) refuse(file, "expected a mesh that encloses a volume", "a flat one", "fit a surface without inside by --kind shell");
+  repair.turned = volume < 0.0;
   if (repair.turned) pmp::reverse_face_orientations(mesh);
   repair.vertices = mesh.number_of_vertices();
   repair.triangles = mesh.number_of_faces();
