@@ -23,6 +23,7 @@ if [[ $build == "$supple_root/build/release" ]]; then
   targets=(stress supple_tool scenes_tests collision_tests implicit_tests core_tests benchmarks)
   # A configured folder keeps its options.
   [[ -f $build/build.ninja ]] || cmake -S "$supple_root" --preset release -DSUPPLE_BUILD_TESTS=ON >"$log" 2>&1
+  grep -q '^build [^:]*supple_fit_program:' "$build/build.ninja" && targets+=(supple_fit_program)  # without CGAL there is none
   cmake --build "$build" --target "${targets[@]}" >>"$log" 2>&1 || { tail -n 40 "$log" && exit 1; }
 fi
 exec python3 "$supple_root/tests/stress/stress.py" "$@"
