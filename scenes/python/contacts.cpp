@@ -236,7 +236,7 @@ void bind_contacts(py::module_& module, Simulation& simulation) {
       .def(
           "energy_estimates",
           [](Handle& h) { return own(h.use([](scenes::Simulation& s) { return s.energy_estimates(); })); },
-          "What the energies of contacts() may be off by [J], shape (pairs,). It takes two to ten times as long as the contacts.")
+          "What the energies of contacts() may be off by [J], shape (pairs,). It solves the contacts once more, to a hundredth of their error.")
       .def(
           "contact_capacity",
           [](Handle& h, const std::string& a, const std::string& b) {

@@ -243,6 +243,10 @@ TEST_F(Looks, ShowWhatEachKeyAsksFor) {
             first_picture(scene_with("colour_by: speed, range: [0, 2]", kOneCamera)).pixels);
 }
 
+const std::vector<double>& column_of(const Mesh& mesh, const std::string& name) {
+  return std::find_if(mesh.columns.begin(), mesh.columns.end(), [&](const auto& c) { return c.name == name; })->values;
+}
+
 TEST(Pressure, OfMeshesIsThatOfTheContactSurface) {
   // Unlike balls on each other and one on the ground.
   Simulation simulation(parse_scene(R"(
@@ -266,18 +270,15 @@ objects:
   const std::array<double, 2> modulus = {2e3, 6e3};
   for (std::size_t i = 0; i < 2; ++i) {
     const Mesh& mesh = simulation.meshes()[i];
-    const auto column = [&](const std::string& name) -> const std::vector<double>& {
-      return std::find_if(mesh.columns.begin(), mesh.columns.end(), [&](const auto& c) { return c.name == name; })->values;
-    };
     std::vector<double> value(mesh.vertex_count());
     simulation.fields()[i].evaluate(mesh.position, value);
     double most = 0.0;
     for (std::size_t v = 0; v < value.size(); ++v) {
-      const double pressure = column("pressure")[v];
+      const double pressure = column_of(mesh, "pressure")[v];
       if (mesh.position[v].z() < -0.3) continue;  // in the ground, which does not cut the surface
       most = std::max(most, pressure);
       // Vertices are roots to 1e-10 in units of F.
-      const double expected = column("contact")[v] > 0.0 ? std::max(0.0, modulus[i] * value[v]) : 0.0;
+      const double expected = column_of(mesh, "contact")[v] > 0.0 ? std::max(0.0, modulus[i] * value[v]) : 0.0;
       EXPECT_NEAR(pressure, expected, 1e-9 * modulus[i]) << mesh.position[v].transpose();
     }
     // A vertex lies within a cell of the peak, about which the pressure falls by less than its second derivative over F, 6 / R^2, says.
@@ -304,7 +305,7 @@ objects:
 )", "test.yaml", "."));
   ASSERT_EQ(simulation.contacts().summary.size(), 2u);
   const Mesh& mesh = simulation.meshes()[0];
-  const std::vector<double>& pressure = std::find_if(mesh.columns.begin(), mesh.columns.end(), [](const auto& c) { return c.name == "pressure"; })->values;
+  const std::vector<double>& pressure = column_of(mesh, "pressure");
   double most = 0.0, largest = 0.0;
   for (const auto& s : simulation.contacts().summary) largest = std::max(largest, s.largest_pressure);
   for (std::size_t v = 0; v < pressure.size(); ++v) {

@@ -98,7 +98,7 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
                            const ContactSettings& settings, const Executor& executor, ContactSurface& out);
 
 /// What energies may be off by: three times the difference of those of each body, in all its pairs together, and what another solution gives whose error is a hundredth,
-/// 1e-6 at most, and whose columns begin elsewhere; and what both may miss alike, a fifth of the error, 2e-5 at most. It takes two to ten times as long as the surface itself.
+/// 1e-6 at most, and whose columns begin elsewhere; and what both may miss alike, a fifth of the error, 2e-5 at most. It costs that finer solution.
 /// @param bodies, candidates, settings  that `surface` is solved for, with energies   @return of each pair of `surface.summary`, of both of its bodies together [J]
 [[nodiscard]] std::vector<double> estimate_energies(std::span<const ContactBody> bodies, const ContactCandidates& candidates, const ContactSettings& settings,
                                                     const Executor& executor, const ContactSurface& surface);

@@ -152,10 +152,10 @@ std::optional<Apex> find_shared_apex(PairPressure& pressure, int side, Thirds ot
     free.push_back({first_order < most ? first_order : most, i});
   }
   std::stable_sort(free.begin(), free.end(), wider);
-  free.resize(std::min(free.size(), kLookedAt));
+  free.resize(kLookedAt);  // places_in_body gives more
   for (Free& f : free) f.clear = free_around(pressure, side, others, place[f.place], there.lost(f.place), f.clear);
   std::stable_sort(free.begin(), free.end(), wider);
-  const std::size_t best = free[std::min(static_cast<std::size_t>(rank), free.size() - 1)].place;
+  const std::size_t best = free[static_cast<std::size_t>(rank)].place;
   taker = there.by[best];
   return Apex{.at = place[best], .lost = there.lost(best)};
 }

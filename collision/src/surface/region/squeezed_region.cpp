@@ -19,7 +19,7 @@ constexpr double kFewestPlaces = 16.0, kMostPlaces = 512.0, kFewestCells = 4.0, 
 // What is smaller than a cell or than what lies between two places is a small share of the region: over the error, and over its root.
 constexpr double kPlacesOfError = 0.64, kCellsOfError = 0.5;
 constexpr double kRough = 1e-2;  // error from which on fewer Gauss points along a piece of a column are enough
-constexpr int kAlong = 8, kAlongRough = 4;
+constexpr int kAlong = 8, kAlongRough = 4;  // these points
 constexpr double kFine = 1e-4;  // error below which there may be more cells, and pieces are half as long
 constexpr std::size_t kMostLeaves = 4096, kMostFineLeaves = 16384;
 constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns, off by the square of what the last two values lie apart
