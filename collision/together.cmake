@@ -12,9 +12,9 @@ supple_together(
    src/surface/panels/sigma_rays.cpp src/surface/polar/apex.cpp"
   "src/surface/panels/panel_rule.cpp src/surface/panels/panels.cpp src/surface/panels/star_rims.cpp"
   "src/surface/polar/cross_kinks.cpp src/surface/polar/middle_rule.cpp src/surface/polar/polar_cover.cpp
-   src/surface/polar/symmetry.cpp src/surface/polar/touch_kinks.cpp"
+   src/surface/polar/symmetry.cpp"
   "src/surface/polar/imprint.cpp src/surface/polar/star_rule.cpp src/surface/quadrature.cpp"
   "src/surface/polar/polar_patches.cpp src/surface/polar/polar_rule.cpp src/surface/region/polar_columns.cpp
    src/surface/region/squeezed_region.cpp"
-  "src/surface/polar/rim_corners.cpp src/surface/polar/smooth_estimate.cpp src/surface/region/energy_columns.cpp
+  "src/surface/polar/rim_corners.cpp src/surface/region/energy_columns.cpp
    src/surface/region/sigma_columns.cpp src/surface/third_bodies.cpp")

@@ -2,6 +2,8 @@
 /// Numbers by which all rules decide alike.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 #include "supple/implicit/kinks.h"
@@ -28,6 +30,13 @@ inline constexpr double kOfParts = 0.9;
 inline constexpr double kOfKept = 0.5;
 /// What a straight line between two values may be off by where what it stands for bends once: of the rectangle that the values span.
 inline constexpr double kOfRectangle = 0.125;
+
+/// What the finer of two orders is off by at most where both converge, from what they differ by: less than that, and the less the less they differ, as in
+/// QUADPACK (Piessens et al. 1983, sec. 2.2.4.1).
+[[nodiscard]] inline double error_of_finer(double difference) {
+  constexpr double kRegular = 100.0, kLeast = 0.1;
+  return difference * std::clamp(kRegular * std::sqrt(difference), kLeast, 1.0);
+}
 
 /// Whether a rule leaves a kink uncut: across a jump of a third derivative sums converge with the fourth power of their points, which is enough at these errors.
 [[nodiscard]] inline bool is_mild(const implicit::Kink& kink, double error) {

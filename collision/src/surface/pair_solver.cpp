@@ -201,6 +201,7 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   const bool star = stars_cut(job, std::max(error, kFinestPanels), out), coarse = error >= kFinestPanels;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
   if (star && coarse && !small && (out.points.point.empty() || meets(out, error))) return true;
+  if (star && coarse && (apex_[0] || apex_[1])) return false;  // what flows out of these is held to the error by stars alone
   std::swap(kept_, out);
   out.summary.bodies = job.pair;
   if (!imprints_cut(job, out)) return false;
@@ -308,8 +309,10 @@ bool PairSolver::polar(const Job& job, PairResult& out) {
   if (patches_.empty() || meets(out, error)) return true;
   // Rims and rounding may add a little to what panels are held to, and several patches are off by more than each of them: finer ones cost far
   // less than another rule.
-  out.clear();
-  if (rings(job, kFiner * error, out) && meets(out, error)) return true;
+  for (const double finer : {kFiner * error, kFiner * kFiner * error}) {
+    out.clear();
+    if (rings(job, finer, out) && meets(out, error)) return true;
+  }
   out.clear();
   return rings(job, error, out);
 }

@@ -38,30 +38,6 @@ GaussRule make_gauss(int n) {
   return rule;
 }
 
-/// Orthonormal polynomials at the nodes, from those of lower degrees by Gram and Schmidt, twice for round-off.
-void add_highest(KronrodRule& rule) {
-  const std::size_t n = rule.node.size();
-  const auto product = [&](const std::vector<double>& f, const std::vector<double>& g) {
-    double sum = 0.0;
-    for (std::size_t k = 0; k < n; ++k) sum += rule.weight[k] * f[k] * g[k];
-    return sum;
-  };
-  std::vector<std::vector<double>> all;
-  for (std::size_t degree = 0; degree < n; ++degree) {
-    std::vector<double> next(n, 1.0);
-    for (std::size_t k = 0; k < n && degree > 0; ++k) next[k] = rule.node[k] * all.back()[k];
-    for (std::size_t i = 0; i < 2 * degree; ++i) {
-      const std::vector<double>& lower = all[i % degree];
-      const double share = product(next, lower);
-      for (std::size_t k = 0; k < n; ++k) next[k] -= share * lower[k];
-    }
-    const double length = std::sqrt(product(next, next));
-    for (double& value : next) value /= length;
-    all.push_back(std::move(next));
-  }
-  for (std::size_t d = 0; d < rule.highest.size(); ++d) rule.highest[d] = d < n ? all[n - 1 - d] : std::vector<double>(n, 0.0);
-}
-
 /// @param node  the positive ones from the outside, the middle one last   @param smaller  weights of every second one
 KronrodRule make_nested(std::span<const double> node, std::span<const double> weight, std::span<const double> smaller) {
   KronrodRule rule;
@@ -72,7 +48,6 @@ KronrodRule make_nested(std::span<const double> node, std::span<const double> we
     rule.weight.push_back(weight[i]);
     rule.gauss_weight.push_back(i % 2 == 1 ? smaller[i / 2] : 0.0);
   }
-  add_highest(rule);
   return rule;
 }
 

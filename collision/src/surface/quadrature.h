@@ -29,8 +29,6 @@ struct KronrodRule {
   std::vector<double> node;          ///< rising
   std::vector<double> weight;        ///< sum to 2
   std::vector<double> gauss_weight;  ///< of the smaller rule, 0 where it has no node
-  /// At the nodes, polynomials of the highest degrees that these tell apart, falling; orthonormal in the sum with `weight`.
-  std::array<std::vector<double>, 6> highest;
 };
 /// @param gauss  nodes of the smaller rule, in {2, 3, 7}; 2 gauss + 1 of the larger (Kronrod 1965; QUADPACK)
 [[nodiscard]] const KronrodRule& kronrod_rule(int gauss);

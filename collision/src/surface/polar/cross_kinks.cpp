@@ -400,21 +400,6 @@ std::array<double, 2> PolarRuleSolver::Panel::bend(double x) const {
   return touch_begin ? std::array{begin + width * y * y, width * y} : std::array{end - width * z * z, width * z};
 }
 
-/// A kink that one of two neighbouring rays meets twice where the other does not, while they meet the same ones besides.
-std::optional<PolarRuleSolver::Touch> PolarRuleSolver::touch_between(std::span<const Crossing> before, std::span<const Crossing> here) const {
-  const auto same = [](const Crossing& x, const Crossing& y) { return x.kink == y.kink; };
-  const std::span<const Crossing> more = before.size() > here.size() ? before : here, less = before.size() > here.size() ? here : before;
-  if (more.size() != less.size() + 2) return std::nullopt;
-  const auto [there, at] = std::mismatch(more.begin(), more.end(), less.begin(), less.end(), same);
-  const Crossing& x = *there;
-  // Those between the two, which the other ray may meet at the same places of the order.
-  const auto after = std::find_if(there + 1, more.end(), [&](const Crossing& y) { return same(x, y); });
-  if (after == more.end() || x.kink >= kinks_.size()) return std::nullopt;
-  if (!std::equal(there + 1, after, at, at + (after - there - 1), same)) return std::nullopt;
-  if (!std::equal(after + 1, more.end(), at + (after - there - 1), less.end(), same)) return std::nullopt;
-  return Touch{x.kink, 0.0, 0.5 * (x.radius + after->radius) * rays_.radius[x.ray], 0.5 * (x.height + after->height), 0.0, 0.0};
-}
-
 /// Where neighbouring rays of the panels from `first` on meet other kinks, or in another order; only crossings that were found are kept.
 void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
@@ -439,7 +424,6 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
       const auto differ = std::mismatch(before.begin(), before.end(), here.begin(), here.end(), same);
       const bool changes = differ.first != before.end() || differ.second != here.end();
       if (k > 0 && changes) {
-        Change change;
         double share = 0.5;
         const auto at = static_cast<std::size_t>(differ.first - before.begin());
         if (before.size() == here.size() && at + 1 < here.size() && same(before[at], here[at + 1]) && same(before[at + 1], here[at])) {
@@ -453,16 +437,8 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
             share = *corner;
             panel.leaves = true;
           }
-        } else if (!about_middle_) {
-          change.touch = touch_between(before, here);
-          if (change.touch) {
-            change.touch->angle = place_at(rule.node[before.size() > here.size() ? k - 1 : k]);
-            change.touch->from = place_at(rule.node[k - 1]);
-            change.touch->to = place_at(rule.node[k]);
-          }
         }
-        change.place = place_at(rule.node[k - 1] + share * (rule.node[k] - rule.node[k - 1]));
-        changes_.push_back(change);
+        changes_.push_back(place_at(rule.node[k - 1] + share * (rule.node[k] - rule.node[k - 1])));
       }
       before = here;
     }

@@ -19,8 +19,6 @@ constexpr double kNear = 0.3;              // pressure at the rim, of that in th
 constexpr double kFar = 2.0;               // from Sigma, in the overlap: Newton's method is not believed
 constexpr double kRough = 0.05, kFine = 1e-2;  // of the radius, to find the middle and the corners
 constexpr double kClear = 0.1;             // of the radius, from kinks to the middle
-constexpr double kSharp = 0.1;             // of a sector's length: strips whose width grows as a root from there on do so all over it
-constexpr double kStripsBelow = 1e-5;      // errors that take so few points otherwise that it does not pay
 constexpr double kWidest = 1.7;            // sector [rad] in units of u and v
 constexpr double kSameCorner = 1e-6;
 
@@ -265,9 +263,9 @@ void PolarRuleSolver::follow_tangents() {
 }
 
 /// Corners and points of the outline by angle; of those that lie on one ray, corners are kept.
-std::vector<PolarRuleSolver::Mark> PolarRuleSolver::mark_outline(std::span<const RimCorner> corners) const {
+std::vector<PolarRuleSolver::Mark> PolarRuleSolver::mark_outline(std::span<const RimPoint> corners) const {
   std::vector<Mark> all, marks;
-  for (const RimCorner& c : corners) all.push_back({c.point, true, c.strip_before, c.strip_after, false, c.root_within});
+  for (const RimPoint& c : corners) all.push_back({c, true});
   for (const RimPoint& p : outline_) all.push_back({p, false});
   std::stable_sort(all.begin(), all.end(), [](const Mark& a, const Mark& b) { return before(a.point.at, b.point.at); });
   for (const Mark& mark : all) {
@@ -301,7 +299,7 @@ void PolarRuleSolver::mark_touches(std::vector<Mark>& marks) const {
       for (std::size_t k = 0; k < marks.size(); ++k) {
         Mark &a = marks[k], &b = marks[(k + 1) % marks.size()];
         if (!(cross(a.point.at, way) >= 0.0) || !(cross(way, b.point.at) > 0.0)) continue;
-        const Mark touch{point_between(a.point, b.point, way), true, false, false, true};
+        const Mark touch{point_between(a.point, b.point, way), true, true};
         if (on_one_ray(a, touch)) {
           a.corner = a.touch = true;
         } else if (on_one_ray(touch, b)) {
@@ -317,7 +315,7 @@ void PolarRuleSolver::mark_touches(std::vector<Mark>& marks) const {
 
 /// Sectors between corners of the outline, and between others of its points where these are too far apart.
 /// @return whether rays through them turn one way
-bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners) {
+bool PolarRuleSolver::make_sectors(std::span<const RimPoint> corners) {
   std::vector<Mark> marks = mark_outline(corners);
   mark_touches(marks);
   const std::size_t n = marks.size();
@@ -350,9 +348,7 @@ bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners) {
     const Mark &first = marks[(begin + from) % n], &last = marks[(begin + to) % n];
     const RimPoint &a = first.point, &b = last.point;
     const RimPoint middle = along(0.5 * (a.at + b.at), (begin + from) % n, to - from);
-    const double sharp = kSharp * frame_.across(b.at - a.at).norm();
-    sectors_.push_back({{a.at, middle.at, b.at}, {a.height, middle.height, b.height}, first.touch, last.touch,
-                        first.strip_after && first.root_within < sharp, last.strip_before && last.root_within < sharp});
+    sectors_.push_back({{a.at, middle.at, b.at}, {a.height, middle.height, b.height}, first.touch, last.touch});
     from = to;
   }
   return std::all_of(sectors_.begin(), sectors_.end(), [](const Sector& sector) {
@@ -360,15 +356,15 @@ bool PolarRuleSolver::make_sectors(std::span<const RimCorner> corners) {
   });
 }
 
-/// A panel for each sector. @param nodes  on a ray   @param strips  angles grow as a square from where they begin
-void PolarRuleSolver::start_sectors(int nodes, bool strips) {
+/// A panel for each sector. @param nodes  on a ray
+void PolarRuleSolver::start_sectors(int nodes) {
   panels_.clear();
   for (std::size_t k = 0; k < sectors_.size(); ++k) {
     Panel panel;
     panel.begin = static_cast<double>(k);
     panel.end = static_cast<double>(k + 1);
-    panel.touch_begin = sectors_[k].touch_begin || (strips && sectors_[k].strip_begin);
-    panel.touch_end = sectors_[k].touch_end || (strips && sectors_[k].strip_end);
+    panel.touch_begin = sectors_[k].touch_begin;
+    panel.touch_end = sectors_[k].touch_end;
     panel.nodes = nodes;
     panels_.push_back(panel);
   }
@@ -429,11 +425,11 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   const double error = settings.error;
   const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_, third = fine && error >= 1e-6 && !cut_;
   for (;;) {
-    std::vector<RimCorner> corners;
+    std::vector<RimPoint> corners;
     find_outline_corners(pressure, corners);
     if (crossing_.empty()) return false;
     if (!make_sectors(corners)) return false;
-    start_sectors(error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8, error < kStripsBelow);
+    start_sectors(error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8);
     const KronrodRule& first = kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7);
     const std::size_t crossing = crossing_.size();
     if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr)) return false;

@@ -24,24 +24,12 @@ constexpr double kNearRimOfFace = 1.0;   // beside whose edges the slope grows f
 constexpr double kBelowRim = 0.05;       // over the peak
 constexpr int kFreeRimSteps = 10;
 constexpr int kHeightSteps = 14;
-constexpr double kLeastOfEnds = 0.25, kLeastOfFinest = 0.01;  // of what the ends of rays say: errors of deep balls are a seventh and less
 
-/// What tells whether rule r is enough where no kink is near; far above what force, area and centre are off by, as energies converge later. Its difference from rule r - 1 says so: both converge exponentially, the
-/// faster the less they differ and the less the rim moved, over its radius, from where the angles of rule r - 1 put it. The forces
-/// of both may agree by chance, as their errors change sign with depth; then the spread of the pressure, which converges later,
-/// does not.
-double error_where_smooth(std::size_t r, const PatchSums& fine, const PatchSums& coarse, double moved) {
-  const double spread = std::abs(fine.spread - coarse.spread) / fine.spread;
-  const double later = r == 1 ? 60.0 : r == 2 ? 25.0 : 10.0;
-  const double difference = std::max(relative_difference(fine, coarse), spread / later), root = std::sqrt(difference);
-  // Shares fitted to the errors of patches between ellipsoids, capsules, discs, boxes and blobs; in other poses the least estimate was twice
-  // the error.
-  switch (r) {
-    case 1: return difference * (0.05 + 20.0 * difference + (25.0 + 3600.0 * moved) * moved);
-    case 2: return difference * (0.1 + 10.0 * root + 20.0 * moved);
-    case 3: return difference * (0.01 + 5.0 * root + 60.0 * moved);
-    default: return difference * (0.02 + 30.0 * root + 200.0 * moved);
-  }
+/// What tells whether a rule is enough where no kink is near: the forces of two may agree by chance, as their errors change sign with depth; then the spread of
+/// the pressure, which converges later, does not.
+double error_where_smooth(const PatchSums& fine, const PatchSums& coarse) {
+  constexpr double kLater = 0.04;
+  return error_of_finer(std::max(relative_difference(fine, coarse), kLater * std::abs(fine.spread - coarse.spread) / fine.spread));
 }
 
 /// The same where kinks may cross the patch, unseen by either rule.
@@ -85,14 +73,6 @@ void PolarRuleSolver::start_rim(const PolarRule& rule, bool first) {
     rim_.radius[k] = radius;
     rim_.height[k] = height;
   }
-  start_radius_ = rim_.radius;
-}
-
-/// The largest share of a radius by which the rim is off where `start_rim` put it.
-double PolarRuleSolver::rim_moved() const {
-  double moved = 0.0;
-  for (std::size_t k = 0; k < rim_.size(); ++k) moved = std::max(moved, std::abs(start_radius_[k] / rim_.radius[k] - 1.0));
-  return moved;
 }
 
 void PolarRuleSolver::start_rim_search(Rays& rays) {
@@ -104,8 +84,6 @@ void PolarRuleSolver::start_rim_search(Rays& rays) {
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
   rim_error_ = 0.0;
-  rim_left_.assign(n, 0.0);
-  moved_.assign(n, 0.0);
 }
 
 /// Spreads the columns of both sides as far as the bodies lean away at the rim. @param across  from the axis to the rim   @return false where that is too far
@@ -115,9 +93,7 @@ bool PolarRuleSolver::columns_reach_rim(const AlongAxis& sigma, const Vec3& acro
   return sigma.up_b > kUpright * norm_b || widen_columns(1, sigma.slope_b / -norm_b, across);
 }
 
-/// @param again  evaluate all rays until the last has ended: estimates on smooth patches take what is left of the way from the pressure at its end
-bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error, bool again) {
-  const std::size_t n = rays.size();
+bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error) {
   start_rim_search(rays);
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
   const double enough = std::min(1e-3, 0.1 * std::sqrt(error));
@@ -131,13 +107,8 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
   };
   for (int iteration = 0; iteration < kBracketSteps && !open_.empty(); ++iteration) {
     heed_scope();
-    if (again) {
-      for (std::size_t k = 0; k < n; ++k) place(k);
-      pressure.evaluate(rim_batch_);
-    } else {
-      for (const std::size_t k : open_) place(k);
-      pressure.evaluate(rim_batch_, open_, some_);
-    }
+    for (const std::size_t k : open_) place(k);
+    pressure.evaluate(rim_batch_, open_, some_);
     std::size_t left = 0;
     for (const std::size_t k : open_) {
       const Vec3 e = rays.cosine[k] * u + rays.sine[k] * v;
@@ -155,8 +126,6 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       }
       const double step = next - radius;
       const double lift = ((a - b) + (sigma.slope_a.dot(e) - sigma.slope_b.dot(e)) * step) / sigma.rate;
-      const double last_move = moved_[k];
-      moved_[k] = step * step * e.squaredNorm() + lift * lift;
       const bool settled = std::abs(lift) <= enough * std::max(thickness, std::abs(rays.height[k]));
       const bool smooth = !near || !settled || !about_middle_ || std::abs(step) <= enough * enough * radius ||
                           same_side(rim_batch_.point[k], rim_batch_.point[k] + step * e + lift * axis);
@@ -165,7 +134,6 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
         rays.outward[k] = -Vec2(sigma.slope(u), sigma.slope(v));
         // Newton's method leaves about half the square of its last step, which the area feels twice.
         rim_error_ = std::max(rim_error_, step * step / (radius * radius));
-        if (last_move > 0.0) rim_left_[k] = std::abs(step) / radius * moved_[k] / last_move;
       } else {
         open_[left++] = k;
       }
@@ -392,7 +360,7 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
   for (std::size_t r = first; r <= last; ++r) {
     const PolarRule& rule = round ? polar_rays()[r] : rules[r];
     start_rim(rule, r == first);
-    if (!solve_rim(pressure, rim_, error, true)) return false;
+    if (!solve_rim(pressure, rim_, error)) return false;
     if (smooth && std::any_of(rim_batch_.point.begin(), rim_batch_.point.end(), [this](const Vec3& x) { return !smooth_.contains(x); })) {
       smooth = false;
       first = std::min(first_rule(error, false), last - 1);
@@ -414,17 +382,11 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
     if (parts && !(any && third_.empty()) && kinks_cross(pressure)) return solve_split(pressure, job.settings) && finish_parted(job, points);
     if (r == first) continue;
     const double last_difference = difference;
-    difference = smooth ? std::max(error_where_smooth(r, fine_, coarse_, rim_moved()), kOfLastWhereSmooth * last_difference) : error_at_kinks(r, fine_, coarse_);
+    difference = smooth ? std::max(error_where_smooth(fine_, coarse_), kOfLastWhereSmooth * last_difference) : error_at_kinks(r, fine_, coarse_);
     if (!parts && r > first + 1) difference = std::max(difference, std::min(kOfLast * last_difference, kOfParts * error));
     if (difference > kOfParts * error && r < last) continue;
     estimate_ = (any ? kSafetyAcross : 1.0) * difference + algebraic_error();
     if (estimate_ > error && !any) return false;
-    // Which rule is enough is not asked of this estimate, as energies converge later; but two rules agree by chance where it is far above what they say.
-    if (r <= kFinestJudged && (smooth || (!any && third_.empty() && error < kSplitBelow && clear_of_kinks(pressure)))) {
-      const double by_ends = estimate_by_ends(r, round), least = (r == kFinestJudged ? kLeastOfFinest : kLeastOfEnds) * by_ends;
-      if (least > error && r < last) continue;
-      estimate_ = std::min(std::max(estimate_, least), by_ends);
-    }
     // Pressures do not depend on the angle, so that those of the coarser rule are enough for what slides.
     return finish(pressure, rules[r].column, job.regions, error, round ? &rules[r - 1] : nullptr, points);
   }

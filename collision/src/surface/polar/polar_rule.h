@@ -25,9 +25,6 @@
 
 namespace supple::collision {
 
-/// The finest rule whose error is judged from the ends of its rays.
-inline constexpr std::size_t kFinestJudged = 3;
-
 /// Over the error asked for times the pressure at the peak: pressures of third bodies at the rim that say nothing, as rims are off by more.
 inline constexpr double kAtRim = 0.1;
 
@@ -67,9 +64,8 @@ class PolarRuleSolver {
   void start_about_peak(const PeakFrame& frame);
   void start_rim_search(Rays& rays);
   bool columns_reach_rim(const AlongAxis& sigma, const Vec3& across);
-  bool solve_rim(PairPressure& pressure, Rays& rays, double error, bool again);
+  bool solve_rim(PairPressure& pressure, Rays& rays, double error);
   [[nodiscard]] bool same_side(const Vec3& from, const Vec3& to) const;
-  [[nodiscard]] double rim_moved() const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
   void place_nodes(const PolarRule& rule);
   bool solve_heights(PairPressure& pressure, double error);
@@ -102,29 +98,6 @@ class PolarRuleSolver {
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double placing_error() const;
   [[nodiscard]] double algebraic_error() const;
-  // Estimates on smooth patches: smooth_estimate.cpp.
-  [[nodiscard]] double unseen_by_angles(std::size_t r) const;
-  /// Force, first moment, load and area of a density.
-  struct Density {
-    Vec3 force = Vec3::Zero(), first = Vec3::Zero();
-    double load = 0.0, area = 0.0;
-    void add(const Vec3& x, const Vec3& normal, double weight, double pressure) {
-      const double p = weight * pressure;
-      force += p * normal;
-      first += p * x;
-      load += p;
-      area += weight;
-    }
-  };
-  /// Densities of all rays together: at each node along them, and values and slopes at their ends.
-  struct EndedPatch {
-    std::array<Density, 16> along;
-    Density centre, centre_slope, rim, rim_slope;
-    double left = 0.0;  // of the way to the rim, as what it adds to the area over that
-  };
-  [[nodiscard]] EndedPatch end_rays(const GaussRule& gauss) const;
-  [[nodiscard]] double estimate_by_ends(std::size_t r, bool round) const;
-  [[nodiscard]] bool clear_of_kinks(PairPressure& pressure);
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
 
   // Patches that kinks cross: split_rule.cpp; crossings of rays: cross_kinks.cpp.
@@ -135,9 +108,7 @@ class PolarRuleSolver {
     std::size_t first = 0, last = 0;  // of `kept_`
     std::size_t rim = 0, rim_end = 0;  // of `kept_rim_`
     PatchSums fine, angular, radial;  // the finest sums, with fewer angles, with other radii besides
-    std::array<PatchSums, 6> highest;  // as a polynomial of the angle, its coefficients of the highest degrees, falling
     double by_angle = 0.0, by_radius = 0.0;  // what the finest sums may be off by, for either reason
-    double by_rim = 0.0;                     // its area, as the rim was left
     int nodes = 0;                    // on a ray that no kink crosses
     std::size_t rays = 0;             // of `fine`
     std::size_t change = 0, change_end = 0;  // of `changes_`
@@ -157,17 +128,6 @@ class PolarRuleSolver {
     Vec3 slope = Vec3::Zero();
     Mat3 bend = Mat3::Zero();
     bool flat = false, told = false;
-  };
-  /// Near where a ray touches a kink.
-  struct Touch {
-    std::size_t kink;
-    double angle, radius, height;  // radius in units of u and v
-    double from, to;               // angles that it lies between
-  };
-  /// Where within a panel rays begin to meet other kinks, or in another order.
-  struct Change {
-    double place = 0.0;
-    std::optional<Touch> touch;    // a kink that rays meet twice before it, or after it, and then not at all
   };
   struct Corner {
     Vec3 at;                       // on the rim
@@ -197,7 +157,7 @@ class PolarRuleSolver {
     double angle;
     bool touch;  // a ray touches something there
   };
-  std::vector<Turn> find_turns(PairPressure& pressure, double error);
+  std::vector<Turn> find_turns(PairPressure& pressure);
   bool solve_split(PairPressure& pressure, const ContactSettings& settings);
   void follow_rim();
   [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
@@ -217,15 +177,12 @@ class PolarRuleSolver {
   void find_crossings(PairPressure& pressure, double error);
   bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
   void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
-  [[nodiscard]] std::optional<Touch> touch_between(std::span<const Crossing> before, std::span<const Crossing> here) const;
   bool add_missed_kinks();
   bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   [[nodiscard]] double piece_share(const KronrodRule& rule, std::size_t ray, std::size_t piece, double width) const;
   void lay_nodes(const KronrodRule& rule, std::size_t ray, int nodes, bool check, double shortest);
   bool solve_panels(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
   void keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray);
-  [[nodiscard]] double rim_error(std::size_t ray, double rate) const;
-  static double slow_decay(const Panel& panel, const PatchSums& all);
   void doubt(Panel& panel, const PatchSums& all) const;
   void start_panels();
   bool doubt_all();
@@ -235,9 +192,8 @@ class PolarRuleSolver {
     bool more, part;
   };
   [[nodiscard]] bool parts_at_changes(const Panel& panel, const Finer& how) const { return how.part && panel.change < panel.change_end && !(about_middle_ && cut_); }
-  void refine_panel(PairPressure& pressure, const Panel& panel, const Finer& how, bool halve, std::vector<Panel>& finer);
+  void refine_panel(const Panel& panel, const Finer& how, bool halve, std::vector<Panel>& finer);
   void gather_panels();
-  [[nodiscard]] bool grows_as_root(const Panel& panel) const;
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
   // Corners of the rim: rim_corners.cpp.
@@ -245,11 +201,6 @@ class PolarRuleSolver {
     Vec2 at = Vec2::Zero();       // in units of u and v
     double height = 0.0;
     Vec2 outward = Vec2::Zero();  // the pressure falls
-  };
-  struct RimCorner {
-    RimPoint point;
-    bool strip_before = false, strip_after = false;  // there, as angles grow, the rim lies beyond an edge that it meets at the corner
-    double root_within = 0.0;                         // the strip's width grows as a root from this far across the rays on [m]
   };
   /// A kink where a ray meets it, on Sigma.
   struct KinkOnRay {
@@ -268,7 +219,6 @@ class PolarRuleSolver {
     Vec2 left, right;
     double rim_left, rim_right;
     bool positive_left;            // s at the rim on the left
-    bool beyond_left;              // the rim lies beyond the kink there
     double place, height;
     double from = 0.0, to = 1.0;
     std::optional<Vec2> at = std::nullopt;
@@ -281,18 +231,7 @@ class PolarRuleSolver {
   void find_corners_between(PairPressure& pressure, std::span<CornerSearch> searches);
   void add_vertices(std::vector<RimPoint>& rays) const;
   [[nodiscard]] std::vector<KinkOnRay> kinks_on_rays(PairPressure& pressure);
-  void add_strips(PairPressure& pressure, std::span<const CornerSearch> searches, std::vector<RimCorner>& corners);
-  void find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners);
-
-  // Rays that touch kinks: touch_kinks.cpp.
-  /// A kink along a ray on Sigma, and the ray's turning.
-  struct Along {
-    double s = 0.0, by_radius = 0.0, by_angle = 0.0;  // s at Sigma above a place near it, and its derivatives there
-    double height = 0.0, rise = 0.0, rise_across = 0.0;  // of Sigma there, and its derivatives
-  };
-  [[nodiscard]] Along along_ray(const PressureBatch& at, std::size_t i, std::size_t kink, double angle, double radius) const;
-  std::optional<double> touching_angle(PairPressure& pressure, const Touch& near);
-  void find_hidden_touches(PairPressure& pressure, std::span<const Corner> corners, std::vector<double>& angles);
+  void find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners);
 
   // About the middle: middle_rule.cpp.
   /// Directions of rays as a parabola through three points near the rim, with heights.
@@ -300,7 +239,6 @@ class PolarRuleSolver {
     std::array<Vec2, 3> at;
     std::array<double, 3> height;
     bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
-    bool strip_begin = false, strip_end = false;  // a strip beyond an edge begins there
   };
   /// The search for the rim along one ray: the last place inside, and one outside.
   struct Walk {
@@ -334,15 +272,14 @@ class PolarRuleSolver {
   struct Mark {
     RimPoint point;
     bool corner;
-    bool strip_before = false, strip_after = false, touch = false;
-    double root_within = 0.0;
+    bool touch = false;
   };
   static bool on_one_ray(const Mark& a, const Mark& b);
   static RimPoint point_between(const RimPoint& a, const RimPoint& b, const Vec2& way);
-  [[nodiscard]] std::vector<Mark> mark_outline(std::span<const RimCorner> corners) const;
+  [[nodiscard]] std::vector<Mark> mark_outline(std::span<const RimPoint> corners) const;
   void mark_touches(std::vector<Mark>& marks) const;
-  [[nodiscard]] bool make_sectors(std::span<const RimCorner> corners);
-  void start_sectors(int nodes, bool strips);
+  [[nodiscard]] bool make_sectors(std::span<const RimPoint> corners);
+  void start_sectors(int nodes);
   void cross_outline();
   void place_rays(const KronrodRule& rule, std::size_t first);
   bool solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger);
@@ -377,7 +314,7 @@ class PolarRuleSolver {
   double jacobian_ = 0.0;  // |u| |v|
   double extent_ = 0.0;
   Rays rim_;
-  std::vector<double> coarse_radius_, coarse_height_, start_radius_;
+  std::vector<double> coarse_radius_, coarse_height_;
   std::vector<double> low_, high_;
   PressureBatch rim_batch_, crossing_batch_, node_;
   PressureBatch some_;              // points of one of these at which Newton's method has not ended
@@ -387,8 +324,6 @@ class PolarRuleSolver {
   std::vector<double> line_value_, other_value_;
   double residual_ = 0.0;
   double rim_error_ = 0.0;  // relative, of the area
-  // Of rays: the square of the last step of Newton's method to the rim [m^2], and what the last two say is left of the way, over the radius.
-  std::vector<double> moved_, rim_left_;
   double lift_ = 0.0;       // largest distance of a node from Sigma
   double below_ = 0.0;      // load of nodes that lie just beyond the rim, which is left out
   double size_ = 0.0;       // of the bodies' features
@@ -422,7 +357,7 @@ class PolarRuleSolver {
   std::vector<double> linear_, square_, rest_;  // heights along a ray: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest)
   std::vector<Crossing> crossings_;
   std::vector<std::size_t> first_crossing_;  // of a ray, and their number
-  std::vector<Change> changes_;
+  std::vector<double> changes_;  // places where within a panel rays begin to meet other kinks, or in another order
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
   bool about_middle_ = false, about_star_ = false;  // about the middle rays go through `sectors_`
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis; 0 elsewhere

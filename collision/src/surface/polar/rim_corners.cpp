@@ -21,7 +21,6 @@ constexpr double kNearRim = 0.05;         // of the radius
 constexpr double kBeside = 1.0;           // of the way to the next ray: where kinks may meet between two
 constexpr double kParallel = 1e-9;        // sine between kinks that do not meet
 constexpr double kLeastShare = 0.3;       // radius of the rim, as it leads from one ray to the next, over that of such a place
-constexpr double kAside = 1e-3;           // of the radius, to see how the pressure falls beyond an edge
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 constexpr double kMet = 1e-9;             // of the radius, which the step leaves the square of
 constexpr double kFarthest = 2.0;          // radius of an edge, over that of the rim, at which the pressure is asked
@@ -324,52 +323,19 @@ std::vector<PolarRuleSolver::KinkOnRay> PolarRuleSolver::kinks_on_rays(PairPress
   return all;
 }
 
-/// Adds corners with what is known of the strips that begin there: p = slope . x - bend y^2 / 2 at a distance y beyond the edge. On rays, the rim begins
-/// as a root where the slope along them is small.
-void PolarRuleSolver::add_strips(PairPressure& pressure, std::span<const CornerSearch> searches, std::vector<RimCorner>& corners) {
-  PressureBatch& batch = crossing_batch_;
-  batch.resize(2 * searches.size());
-  std::vector<Vec3> outward;
-  for (std::size_t i = 0; i < searches.size(); ++i) {
-    const Vec2& at = *searches[i].at;
-    batch.point[2 * i] = frame_.place(at, searches[i].height);
-    Vec3 slope;
-    static_cast<void>(kinks_[searches[i].kink].value(batch.point[2 * i], slope));
-    slope -= slope.dot(frame_.axis) * frame_.axis;
-    outward.push_back(std::copysign(1.0 / slope.norm(), slope.dot(frame_.across(at))) * slope);
-    batch.point[2 * i + 1] = batch.point[2 * i] + kAside * frame_.across(at).norm() * outward[i];
-  }
-  pressure.evaluate(batch);
-  const auto slope_of = [&](std::size_t j) -> Vec3 {  // over steps across the axis, on Sigma
-    const Vec3 &a = batch.slope_a[j], &b = batch.slope_b[j];
-    const double a_up = a.dot(frame_.axis), b_up = b.dot(frame_.axis);
-    const Vec3 slope = (b_up * a - a_up * b) / (b_up - a_up);
-    return slope - slope.dot(frame_.axis) * frame_.axis;
-  };
-  for (std::size_t i = 0; i < searches.size(); ++i) {
-    const CornerSearch& search = searches[i];
-    const Vec3 slope = slope_of(2 * i);
-    const double aside = (batch.point[2 * i + 1] - batch.point[2 * i]).norm(), bend = (slope - slope_of(2 * i + 1)).dot(outward[i]) / aside;
-    const Vec3 along = frame_.across(*search.at).normalized(), across = frame_.axis.cross(along);
-    const double falls = slope.dot(along), square = outward[i].dot(along) * outward[i].dot(along);
-    const double grows = falls * falls / (2.0 * bend * square * std::abs(slope.dot(across)));
-    corners.push_back({{*search.at, search.height, Vec2::Zero()}, search.beyond_left, !search.beyond_left, bend > 0.0 ? grows : kInfinity});
-  }
-}
-
 /// Where kinks meet the rim, between rays of the outline; those that do cross the patch.
-void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimCorner>& corners) {
+void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners) {
   const std::vector<KinkOnRay> all = kinks_on_rays(pressure);
   // Where the strip beyond an edge all but ends, its width has a kink.
   for (const KinkOnRay& ray : all) {
-    if (ray.dip && ray.pressure > 0.0) corners.push_back({{ray.radius * ray.way, ray.height, Vec2::Zero()}});
+    if (ray.dip && ray.pressure > 0.0) corners.push_back({ray.radius * ray.way, ray.height, Vec2::Zero()});
   }
   std::vector<CornerSearch> searches;
   for_neighbours(all, [&](const KinkOnRay& ray, const KinkOnRay& next) {
     if (ray.positive == next.positive) return;
     const bool both = std::isfinite(ray.pressure) && std::isfinite(next.pressure);
     const KinkOnRay& near = ray.pressure > next.pressure ? ray : next;
-    searches.push_back({ray.kink, ray.way, next.way, ray.rim, next.rim, ray.positive, &near == &ray, both ? ray.pressure / (ray.pressure - next.pressure) : 0.5, near.height});
+    searches.push_back({ray.kink, ray.way, next.way, ray.rim, next.rim, ray.positive, both ? ray.pressure / (ray.pressure - next.pressure) : 0.5, near.height});
   });
   find_corners_between(pressure, searches);
   std::erase_if(searches, [](const CornerSearch& search) { return !search.at; });
@@ -377,12 +343,12 @@ void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<R
     const auto place = std::lower_bound(crossing_.begin(), crossing_.end(), search.kink);
     if (place == crossing_.end() || *place != search.kink) crossing_.insert(place, search.kink);
   }
-  add_strips(pressure, searches, corners);
+  for (const CornerSearch& search : searches) corners.push_back({*search.at, search.height, Vec2::Zero()});
   std::vector<Corner> found;
   find_corners(pressure, kinks_.size(), found);
   for (const Corner& corner : found) {
     const Vec3 d = corner.at - frame_.origin;
-    corners.push_back({{frame_.parts_of(d), d.dot(frame_.axis), Vec2::Zero()}});
+    corners.push_back({frame_.parts_of(d), d.dot(frame_.axis), Vec2::Zero()});
   }
 }
 

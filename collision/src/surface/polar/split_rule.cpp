@@ -23,7 +23,6 @@ constexpr double kShort = 0.03;          // share of a ray on which two points a
 constexpr double kUnseen = 1e-3;         // of the error asked for: slivers beyond a kink between two rays
 constexpr double kUnseenBesideThirds = 0.02;  // the pressure itself ends at their borders, which rays cross to within a hundredth of it
 constexpr std::size_t kMostPanels = 48, kMostBesideThirds = 192;  // that the estimate may ask for
-constexpr double kSliversBelow = 1e-6;   // errors at which those between a corner of the rim and the first ray after it matter
 constexpr double kLeastAlong = 0.5;      // cosine between the rim and the line to its next point
 constexpr double kMostChange = 2.0;      // of the radius, over what its slopes say
 
@@ -33,11 +32,8 @@ int nodes_on(int radial, double share) {
   return std::clamp(static_cast<int>(std::ceil(radial * (0.35 + 0.65 * share))), least, kMostRadial);
 }
 
-/// Points that are compared with n: one more, so that what they differ by is what n are off by.
-int check_of(int n) { return n < kMostRadial ? n + 1 : n - 2; }
-
-/// The same on faces, where pieces have polynomials on them: fewer.
-int check_on_faces(int n) { return n > 4 ? n - 2 : n - 1; }
+/// Points that n are compared with.
+int check_of(int n) { return n - 1; }
 
 /// Kinks so near to another, to the peak or to the rim are left out: the error is of the square; on a face, to whose edge the pressure is the same,
 /// of the length itself.
@@ -54,23 +50,6 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
   const Vec3 first = (a.first - b.first) - (a.load - b.load) * all.centre();
   return std::max({force, area, first.norm() / (all.load * std::sqrt(all.area))});
 }
-
-/// What the finer of two rules of angles is off by at most, as shares of their difference. Of panels all of whose rays meet the same kinks in the
-/// same order it converges faster than the coarser one, and the more so the less they differ, as in QUADPACK (Piessens et al. 1983,
-/// sec. 2.2.4.1); less so of panels that were halved because they did not. Where rays meet other kinks from some angle on, a derivative jumps
-/// there, and two rules say little; less so on faces, where the pressure is nearly the same on both sides. The shares come from the errors of
-/// 46,000 panels of a disc on a box, boxes, capsules, plates and blobs.
-constexpr double kRegular = 13.4, kRegularCoarse = 2.0;  // times the root of the difference
-constexpr double kRound = 6e5;  // times its square
-constexpr double kLeast = 0.01, kLeastHalved = 0.03, kHalf = 0.5, kLost = 5.0;
-constexpr double kSlow = 4.0;  // of either difference, where rules converge slowly: rays may touch a third body anywhere on a face, or kinks are not all known
-constexpr double kRegularOnFaces = 2.0;  // times the root of the difference, of the panel itself
-constexpr double kDecayOnFaces = 2.0;    // of panels whose rays meet other kinks from some angle on
-constexpr double kOnFaces = 0.05, kOnFacesHalved = 0.1, kOnFacesDoubted = 0.2, kOnFacesAsRoot = 0.8;
-/// Of the difference of radii from a finer rule, which is what they are off by; on faces from a coarser one.
-constexpr double kRadial = 2.0, kRadialOnFacesFew = 0.15, kRadialOnFaces = 0.03, kRadialOnFacesFine = 0.05, kSlowOnFaces = 0.4;
-constexpr std::size_t kFine = 15;  // rays
-constexpr int kFewOnFaces = 3;     // points on a ray, which are compared with two
 
 }  // namespace
 
@@ -99,7 +78,7 @@ bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule,
     }
   }
   const double rim_error = rim_error_;
-  if (!solve_rim(pressure, rays_, error, false) && !(about_middle_ && follow_rays(pressure) && solve_rim(pressure, rays_, error, false))) return false;
+  if (!solve_rim(pressure, rays_, error) && !(about_middle_ && follow_rays(pressure) && solve_rim(pressure, rays_, error))) return false;
   rim_error_ = std::max(rim_error_, rim_error);
   for (std::size_t p = first; p < panels_.size(); ++p) {
     Panel& panel = panels_[p];
@@ -142,7 +121,7 @@ void PolarRuleSolver::lay_nodes(const KronrodRule& rule, std::size_t ray, int no
     if (c < end && (right - left < shortest || 1.0 - right < shortest)) continue;
     // On faces it is the short last piece on which the pressure falls.
     const int all = about_middle_ ? nodes : nodes_on(nodes, piece_share(rule, ray, c - begin, right - left));
-    const GaussRule& gauss = gauss_rule(!check ? all : about_middle_ ? check_on_faces(all) : check_of(all));
+    const GaussRule& gauss = gauss_rule(check ? check_of(all) : all);
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       const double along = gauss.node[j], r = left + (right - left) * along;
       foot_.push_back(frame_.origin + (r * rim) * e);
@@ -219,28 +198,10 @@ bool PolarRuleSolver::rim_joins(std::size_t first, std::size_t last, bool closed
   return true;
 }
 
-/// What Newton's method may have left of the way to the rim, over the radius: twice the larger of two estimates. One is half the square of its
-/// last step, times the second derivatives of the pressures, which the slopes at the rim and at the last node before it tell. The other has
-/// its rate from the steps of rays that took two or more.
-double PolarRuleSolver::rim_error(std::size_t ray, double rate) const {
-  const std::size_t i = ray_check_[ray] - 1;
-  const Vec3 &a = rim_batch_.slope_a[ray], &b = rim_batch_.slope_b[ray], reach = rays_.radius[ray] * direction(rays_.cosine[ray], rays_.sine[ray]);
-  const double at = a.dot(frame_.axis), bt = b.dot(frame_.axis), fall = b.dot(reach) * at - a.dot(reach) * bt;
-  const double turn = (a - node_.slope_a[i]).norm() * bt - (b - node_.slope_b[i]).norm() * at;
-  const double bend = turn / (fall * (rim_batch_.point[ray] - node_.point[i]).norm());
-  return moved_[ray] * std::max(bend, 2.0 * rate);
-}
-
 /// Adds up a panel's rays from `ray` on and keeps its nodes.
 void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::size_t ray) {
   panel.fine = panel.angular = panel.radial = {};
-  panel.highest = {};
-  const std::size_t highest = rule.node.size() >= kFine ? panel.highest.size() : panel.highest.size() - 2;
   panel.first = kept_.point.size();
-  double rim = 0.0, whole = 0.0, rate = 0.0;
-  for (std::size_t k = ray; k < ray + rule.node.size(); ++k) {
-    if (moved_[k] > 0.0) rate = std::max(rate, rim_left_[k] / moved_[k]);
-  }
   for (std::size_t k = 0; k < rule.node.size(); ++k) {
     PatchSums along;
     for (std::size_t i = ray_nodes_[ray + k]; i < ray_check_[ray + k]; ++i) {
@@ -249,10 +210,6 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
       weigh(along, x, normal_[i], area_[i], pressure_[i]);
     }
     panel.angular.add(along, rule.gauss_weight[k] / rule.weight[k]);
-    for (std::size_t d = 0; d < highest; ++d) panel.highest[d].add(along, rule.highest[d][k]);
-    const double area = rule.weight[k] * turn_[ray + k] * rays_.radius[ray + k] * rays_.radius[ray + k];
-    rim += area * rim_error(ray + k, rate);
-    whole += area;
     for_columns([&](auto& kept, const auto& node) {
       kept.insert(kept.end(), node.begin() + static_cast<std::ptrdiff_t>(ray_nodes_[ray + k]),
                   node.begin() + static_cast<std::ptrdiff_t>(ray_check_[ray + k]));
@@ -261,79 +218,27 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
       weigh(panel.radial, node_.point[i] - frame_.origin, normal_[i], area_[i], pressure_[i]);
     }
   }
-  panel.by_rim = rim / whole;
   panel.rays = rule.node.size();
   panel.last = kept_.point.size();
 }
 
-/// What the coefficients of the highest degrees say that a panel's sums are off by, over those of `all`: nothing to speak of where they fall
-/// from one pair of degrees to the next, as the larger rule is exact to far higher ones; as much as they are where they hardly fall.
-/// Such coefficients are the null rules of Berntsen & Espelid 1991, ACM TOMS 17(2).
-double PolarRuleSolver::slow_decay(const Panel& panel, const PatchSums& all) {
-  std::array<double, 3> size;  // of pairs
-  const bool fine = panel.rays >= kFine;
-  for (std::size_t d = 0; d < (fine ? size.size() : 2); ++d) {
-    const double one = share_of_difference(panel.highest[2 * d], {}, all), other = share_of_difference(panel.highest[2 * d + 1], {}, all);
-    size[d] = std::sqrt(one * one + other * other);
-  }
-  const double high = size[0];
-  const double fall = std::min(1.0, std::max(high / size[1], fine ? size[1] / size[2] : 0.0)), cube = fall * fall * fall;
-  return high * std::min(fall, (fine ? 5.0 : 50.0) * cube * fall);
-}
-
-/// What the sums of a panel are off by at most, over those of `all`.
+/// What the sums of a panel are off by at most, over those of `all`. Where rays meet other kinks from some angle on, a derivative jumps there, and two orders
+/// say little; as little on faces, and where kinks are not all known or parted at.
 void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
-  const bool fine = panel.rays >= kFine;
   panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
   panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
-  if (about_middle_ && cut_) {
-    const double share = kSlow * (panel.halved ? kHalf : 1.0);
-    panel.by_angle *= share;
-    panel.by_radius *= share;
-    return;
+  const bool regular = all_kinks_ && !about_middle_ && std::all_of(kinks_.begin(), kinks_.end(), [this](const implicit::Kink& kink) { return parts_at(kink); });
+  if (regular) panel.by_radius = error_of_finer(panel.by_radius);
+  if (regular && panel.even()) panel.by_angle = error_of_finer(panel.by_angle);
+  if (panel.lost) {
+    panel.by_angle *= kTwoOrders;
+    panel.by_radius *= kTwoOrders;
   }
-  if (!all_kinks_) {
-    // Some may cross any panel, where rules converge slowly.
-    panel.by_angle = std::max(kSlow * panel.by_angle, slow_decay(panel, all));
-    panel.by_radius *= kSlow;
-    return;
-  }
-  // Over the panel itself: what differs so much is not the last digit of a rule that converges.
-  const double off = panel.fine.area > 0.0 ? panel.by_angle * all.area / panel.fine.area : 0.0;
-  const double on_faces = std::max(grows_as_root(panel)         ? kOnFacesAsRoot
-                                   : fine || panel.leaves ? kOnFacesDoubted
-                                   : panel.halved         ? kOnFacesHalved
-                                                          : kOnFaces,
-                                   std::min(kRegularOnFaces * std::sqrt(off), kHalf));
-  if (!panel.even()) {
-    const auto changes = static_cast<double>(panel.change_end - panel.change);
-    const double decay = about_middle_ ? std::min(kDecayOnFaces * slow_decay(panel, all), kHalf * panel.by_angle) : 0.0;
-    panel.by_angle *= panel.lost ? kLost : about_middle_ ? std::max(on_faces, kOnFacesHalved) : kHalf * (fine ? std::clamp(changes, 1.0, 4.0) : 1.0);
-    panel.by_angle = std::max(panel.by_angle, decay);
-  } else {
-    const double root = std::sqrt(panel.by_angle);
-    if (fine) {
-      panel.by_angle *= std::clamp(kRegular * root, cut_ ? kLeastHalved : kLeast, 1.0);
-    } else {
-      // Rays nearly touch kinks that are round.
-      const bool flat = std::all_of(sheets_.begin(), sheets_.end(), [](const Sheet& sheet) { return sheet.flat; });
-      const double share = std::max(kRegularCoarse * root, flat ? 0.0 : kRound * panel.by_angle * panel.by_angle);
-      panel.by_angle *= about_middle_ ? on_faces : std::clamp(share, cut_ || panel.halved ? kLeastHalved : kLeast, kHalf);
-    }
-    panel.by_angle = std::max(panel.by_angle, slow_decay(panel, all));
-  }
-  if (!about_middle_) {
-    panel.by_radius *= kRadial;
-    return;
-  }
-  const double relative = panel.fine.area > 0.0 ? panel.by_radius * all.area / panel.fine.area : 0.0;
-  const double slow = kSlowOnFaces * std::sqrt(std::sqrt(relative));
-  panel.by_radius *= panel.lost ? kHalf : fine ? kRadialOnFacesFine : std::clamp(slow, panel.nodes <= kFewOnFaces ? kRadialOnFacesFew : kRadialOnFaces, kHalf);
 }
 
 /// Angles at which panels end, as there the integral along a ray is not smooth: where kinks meet the rim, and where rays touch kinks or imprints. The first
 /// one comes again at the end, a whole turn later.
-std::vector<PolarRuleSolver::Turn> PolarRuleSolver::find_turns(PairPressure& pressure, double error) {
+std::vector<PolarRuleSolver::Turn> PolarRuleSolver::find_turns(PairPressure& pressure) {
   std::vector<Corner> corners;
   find_corners(pressure, 0, corners);
   std::vector<Turn> turns;
@@ -342,11 +247,6 @@ std::vector<PolarRuleSolver::Turn> PolarRuleSolver::find_turns(PairPressure& pre
     turns.push_back({turn < 0.0 ? turn + kTurn : turn, touch});
   };
   for (const Corner& corner : corners) add(frame_.parts_of(corner.at - frame_.origin), false);
-  if (error < kSliversBelow) {
-    std::vector<double> hidden;
-    find_hidden_touches(pressure, corners, hidden);
-    for (const double angle : hidden) turns.push_back({angle < 0.0 ? angle + kTurn : angle, true});
-  }
   for (const Imprint& imprint : imprints_) {
     for (const Vec2& way : imprint.touches) add(way, true);
   }
@@ -372,11 +272,11 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
   cut_ = !crossing_.empty() && crossing_.back() >= kinks_.size();
   const bool fine = error < 1e-4;
   const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
-  const int radial = error >= 1e-3 ? 3 : !fine ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 10;
+  const int radial = error >= 1e-3 ? 4 : !fine ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 10;
   const double widest = about_star_ && crossing_.empty() ? kWidestOfStar : fine ? kWidest : kWidestCoarse;
   about_middle_ = false;
   for (;;) {
-    const std::vector<Turn> turns = find_turns(pressure, error);
+    const std::vector<Turn> turns = find_turns(pressure);
     panels_.clear();
     for (std::size_t t = 0; t + 1 < turns.size(); ++t) {
       const double width = turns[t + 1].angle - turns[t].angle;
@@ -415,14 +315,6 @@ bool PolarRuleSolver::add_missed_kinks() {
   return true;
 }
 
-/// Whether a strip beyond an edge begins at one of a panel's ends, as the root of the angle.
-bool PolarRuleSolver::grows_as_root(const Panel& panel) const {
-  if (!about_middle_) return false;
-  const double whole = std::floor(panel.begin);
-  const Sector& sector = sectors_[static_cast<std::size_t>(whole)];
-  return (sector.strip_begin && !panel.touch_begin && panel.begin == whole) || (sector.strip_end && !panel.touch_end && panel.end == whole + 1.0);
-}
-
 /// Forgets the nodes of panels, and what they were off by.
 void PolarRuleSolver::start_panels() {
   kept_.resize(0);
@@ -442,41 +334,35 @@ bool PolarRuleSolver::doubt_all() {
   for (const Panel& panel : panels_) all.add(panel.fine);
   if (!(all.load > 0.0) || !(all.area > 0.0)) return false;
   estimate_ = below_ / all.load;
-  rim_error_ = 0.0;
   for (Panel& panel : panels_) {
     doubt(panel, all);
     estimate_ += panel.by_angle + panel.by_radius;
-    rim_error_ += panel.by_rim * panel.fine.area / all.area;
   }
   return true;
 }
 
 /// Whether rules may agree by chance, as the panel does not begin at the rim's corners.
-bool PolarRuleSolver::leaves_unseen(const Panel& panel) const { return panel.leaves && !panel.halved && panel.rays >= kFine && !(about_middle_ && cut_); }
+bool PolarRuleSolver::leaves_unseen(const Panel& panel) const { return panel.leaves && !panel.halved && panel.rays > kronrod_rule(3).node.size() && !(about_middle_ && cut_); }
 
 /// Appends to `finer` what takes the place of a panel: with more points on its rays, and parted where these change, or halved.
 /// @param halve  whether it is halved where nothing changes
-void PolarRuleSolver::refine_panel(PairPressure& pressure, const Panel& panel, const Finer& how, bool halve, std::vector<Panel>& finer) {
+void PolarRuleSolver::refine_panel(const Panel& panel, const Finer& how, bool halve, std::vector<Panel>& finer) {
   Panel next;
   next.nodes = how.more ? std::min(panel.nodes + 4, kMostRadial) : panel.nodes;
   next.begin = panel.begin;
-  const auto end_at = [&](double place, bool touch) {
+  const auto end_at = [&](double place) {
     if (!(place - next.begin > kSameTurn) || !(panel.end - place > kSameTurn)) return;
     next.end = place;
-    next.touch_end = touch;
     finer.push_back(next);
     next.begin = next.end;
-    next.touch_begin = touch;
+    next.touch_begin = false;
   };
   next.touch_begin = panel.touch_begin;
   next.halved = panel.halved || (how.part && (halve || leaves_unseen(panel)));
   if (parts_at_changes(panel, how)) {
-    for (std::size_t c = panel.change; c < panel.change_end; ++c) {
-      const std::optional<double> touch = changes_[c].touch ? touching_angle(pressure, *changes_[c].touch) : std::nullopt;
-      end_at(touch.value_or(changes_[c].place), touch.has_value());
-    }
+    for (std::size_t c = panel.change; c < panel.change_end; ++c) end_at(changes_[c]);
   } else if (how.part && halve) {
-    end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end), false);
+    end_at(panel.touches() ? panel.bend(0.0)[0] : 0.5 * (panel.begin + panel.end));
   }
   next.end = panel.end;
   next.touch_end = panel.touch_end;
@@ -532,7 +418,7 @@ bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSett
       const Finer how{!enough && panel.by_radius > share && panel.nodes < kMostRadial, (!enough && panel.by_angle > share) || unseen(panel)};
       if (!how.more && !how.part) return false;
       by_angle = by_angle || (how.part && !parts_at_changes(panel, how));
-      refine_panel(pressure, panel, how, larger == nullptr, finer);
+      refine_panel(panel, how, larger == nullptr, finer);
       return true;
     });
     if (finer.empty()) break;
