@@ -309,10 +309,8 @@ bool PairSolver::polar(const Job& job, PairResult& out) {
   if (patches_.empty() || meets(out, error)) return true;
   // Rims and rounding may add a little to what panels are held to, and several patches are off by more than each of them: finer ones cost far
   // less than another rule.
-  for (const double finer : {kFiner * error, kFiner * kFiner * error}) {
-    out.clear();
-    if (rings(job, finer, out) && meets(out, error)) return true;
-  }
+  out.clear();
+  if (rings(job, kFiner * error, out) && meets(out, error)) return true;
   out.clear();
   return rings(job, error, out);
 }
