@@ -21,14 +21,13 @@ constexpr double kErrorOfEnergies = 1e-2;  // far below that
 
 using Summary = collision::ContactSurface::Summary;
 
-const Summary* find_pair(const Frame& frame, const collision::BodyPair& bodies) {
-  const auto& all = frame.surface.summary;
+const Summary* find_pair(const std::vector<Summary>& all, const collision::BodyPair& bodies) {
   const auto at = std::lower_bound(all.begin(), all.end(), bodies, [](const Summary& s, const collision::BodyPair& b) { return s.bodies < b; });
   return at != all.end() && at->bodies == bodies ? &*at : nullptr;
 }
 
-double energy_of(const Frame& frame, const collision::BodyPair& bodies) {
-  const Summary* s = find_pair(frame, bodies);
+double energy_of(const std::vector<Summary>& all, const collision::BodyPair& bodies) {
+  const Summary* s = find_pair(all, bodies);
   return s != nullptr ? s->energy : 0.0;
 }
 
@@ -197,7 +196,7 @@ double energy_of_motion(const StageContext& context, const TakenStep& step, cons
 
 std::optional<TooCoarse> find_missed_contact(const StageContext& context, const TakenStep& step,
                                              const std::vector<implicit::SampleState>& samples, const Frame& seen,
-                                             Frame& trial) {
+                                             const EndContacts* ends, Frame& trial) {
   if (!any_moved_far(context, step, seen)) return std::nullopt;
   const std::vector<FastPair> fast = fast_pairs(context, step, trial);
   if (fast.empty()) return std::nullopt;
@@ -208,12 +207,17 @@ std::optional<TooCoarse> find_missed_contact(const StageContext& context, const 
     std::vector<implicit::SampleState> kept = samples;
     find_contact_surface(now, on_the_way(step, share), kept, trial, true);
   };
+  const auto contacts_at = [&](double end) -> const std::vector<Summary>& {
+    if (ends != nullptr) return end == 0.0 ? ends->before : ends->after;
+    look(end);
+    return trial.surface.summary;
+  };
   std::vector<double> at_ends(fast.size());
-  look(0.0);
-  for (std::size_t k = 0; k < fast.size(); ++k) at_ends[k] = energy_of(trial, fast[k].bodies);
-  look(1.0);
+  const std::vector<Summary>& before = contacts_at(0.0);
+  for (std::size_t k = 0; k < fast.size(); ++k) at_ends[k] = energy_of(before, fast[k].bodies);
+  const std::vector<Summary>& after = contacts_at(1.0);
   for (std::size_t k = 0; k < fast.size(); ++k) {
-    const double energy = energy_of(trial, fast[k].bodies), motion = energy_of_motion(context, step, fast[k].bodies);
+    const double energy = energy_of(after, fast[k].bodies), motion = energy_of_motion(context, step, fast[k].bodies);
     if (energy - at_ends[k] > kSurely * motion) {
       return TooCoarse{fast[k].bodies, " overlap more within one step than their motion allows: their contact gains " +
                                            short_text(energy - at_ends[k]) + " J, their kinetic energy is " + short_text(motion) + " J"};
@@ -225,7 +229,7 @@ std::optional<TooCoarse> find_missed_contact(const StageContext& context, const 
   for (const double share : looks) {
     look(share);
     for (std::size_t k = 0; k < fast.size(); ++k) {
-      const double energy = energy_of(trial, fast[k].bodies);
+      const double energy = energy_of(trial.surface.summary, fast[k].bodies);
       if (!(energy > kSurely * at_ends[k]) || !std::binary_search(fast[k].looks.begin(), fast[k].looks.end(), share)) continue;
       return TooCoarse{fast[k].bodies, " pass each other within one step: their contact holds " + short_text(energy) +
                                            " J on the way and at most " + short_text(at_ends[k]) + " J at its ends"};
@@ -259,7 +263,7 @@ std::optional<TooCoarse> find_unstable_contact(const StageContext& context, cons
   find_contact_surface(context, step.after, kept, trial, true);
   for (const Summary& s : all) {
     if (!suspicious(s)) continue;
-    const double energy = energy_of(trial, s.bodies);
+    const double energy = energy_of(trial.surface.summary, s.bodies);
     if (!(gain(s, energy) > 0.0)) continue;
     return TooCoarse{s.bodies, " are pushed apart too hard within one step: half of it gives them " + short_text(gain(s, 0.0)) +
                                    " J, their contact holds " + short_text(energy) + " J"};

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "simulation/frame.h"
 
@@ -22,13 +24,18 @@ struct TakenStep {
   double size = 0.0;  ///< [s]
 };
 
+/// Contacts at both ends of a step, with energies.
+struct EndContacts {
+  const std::vector<collision::ContactSurface::Summary>&before, &after;
+};
+
 /// The first pair that met within the step while its ends do not show so: on the straight way between them its contact holds
 /// more energy than at both ends, or it gains more from end to end than the two bodies' motion has; by more than energies
 /// err. Paths shorter than the thinner body's iso radius are not checked.
-/// @param seen  bodies after the step  @param trial  scratch for trial states; may be the same
+/// @param seen  bodies after the step  @param ends  absent: found here  @param trial  scratch for trial states; may be `seen`
 [[nodiscard]] std::optional<TooCoarse> find_missed_contact(const StageContext& context, const TakenStep& step,
                                                            const std::vector<implicit::SampleState>& samples, const Frame& seen,
-                                                           Frame& trial);
+                                                           const EndContacts* ends, Frame& trial);
 
 /// The first pair to which the push of half a step would give more energy than it has: from rest more than its contact energy (for a
 /// linear spring, omega step > 2, the limit of velocity Verlet), or by damping more than its contact and kinetic energy.

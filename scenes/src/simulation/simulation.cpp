@@ -183,7 +183,7 @@ void Simulation::Impl::begin_step() {
 void Simulation::Impl::integrate() {
   const bool implicit = core::is_implicit(integrator.settings.method);
   if (implicit && fixes_step(scene) && contact_on()) {
-    advance_divided(time(), dt(), core::halvings(scene.time_step.max_substeps, 1 << state.halvings));
+    (void)advance_divided(time(), dt(), core::halvings(scene.time_step.max_substeps, 1 << state.halvings), measure_within(time()));
   } else {
     advance_particles(time(), dt());
     if (implicit) book_implicit(time() + dt(), dt());
@@ -257,31 +257,38 @@ bool Simulation::Impl::creates_energy(const Energies& before, const core::Ledger
   return now.total() - before.total() - given + lost > kShare * part + 1e-9 * std::abs(before.total());
 }
 
+Simulation::Impl::Measured Simulation::Impl::measure_within(double at) {
+  const Energies energies = energies_within(at);
+  return {energies, pulled.surface.summary};
+}
+
 /// An implicit step that the scene fixes. Contact is found once in a step, at a predicted pose: where bodies pass each other within it, or contact there
-/// gives them energy, it is made as two steps of half its size, and so on. @param halvings  how often at most
+/// gives them energy, it is made as two steps of half its size, and so on. @param halvings  how often at most   @param first  the state before
+/// @return the state after
 /// @throws Error{Diverged} where that is not enough
-void Simulation::Impl::advance_divided(double begin, double h, int halvings) {
+Simulation::Impl::Measured Simulation::Impl::advance_divided(double begin, double h, int halvings, const Measured& first) {
   const State before = state;
-  const Energies energy = energies_within(begin);
   advance_particles(begin, h);
   Profile unused{};
   StageContext quiet = quiet_context(unused);
   quiet.time = begin + h;
   const TakenStep step{.before = before.particles, .after = state.particles, .end = begin + h, .size = h};
-  const Energies now = energies_within(begin + h);
-  const auto missed = find_missed_contact(quiet, step, state.samples, pulled, pulled);
+  Measured last = measure_within(begin + h);
+  const EndContacts ends{.before = first.contacts, .after = last.contacts};
+  const auto missed = find_missed_contact(quiet, step, state.samples, pulled, &ends, pulled);
   if (missed && halvings == 0) throw_too_coarse(*missed);
-  if (halvings > 0 && (missed || creates_energy(energy, before.ledger, now))) {
+  if (halvings > 0 && (missed || creates_energy(first.energies, before.ledger, last.energies))) {
     if (!divided_noted) {
       divided_noted = true;
       warnings.push_back("time_step.substeps: steps of " + short_text(h) + " s pass contacts; those that do are divided (first at frame " +
                          std::to_string(state.frame) + ')');
     }
     state = before;
-    advance_divided(begin, 0.5 * h, halvings - 1);
-    return advance_divided(begin + 0.5 * h, 0.5 * h, halvings - 1);
+    const Measured middle = advance_divided(begin, 0.5 * h, halvings - 1, first);
+    return advance_divided(begin + 0.5 * h, 0.5 * h, halvings - 1, middle);
   }
   book_implicit(begin + h, h);
+  return last;
 }
 
 /// What the contacts of an implicit step did, before it is divided no further.

@@ -31,7 +31,7 @@ void Simulation::Impl::check_fixed_step() {
   Profile unused{};
   const StageContext quiet = quiet_context(unused);
   const TakenStep step{.before = step_begin, .after = state.particles, .end = time(), .size = dt()};
-  const auto found = find_missed_contact(quiet, step, state.samples, seen_contacts(quiet), pulled);
+  const auto found = find_missed_contact(quiet, step, state.samples, seen_contacts(quiet), nullptr, pulled);
   if (found) throw_too_coarse(*found);
   check_fixed_push();
 }

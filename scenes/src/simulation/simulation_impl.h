@@ -78,7 +78,13 @@ struct Simulation::Impl {
   void refine_step();
   void integrate();
   void advance_particles(double begin, double h);
-  void advance_divided(double begin, double h, int halvings);
+  /// Energies at a time within a step, and the contacts then.
+  struct Measured {
+    Energies energies;
+    std::vector<collision::ContactSurface::Summary> contacts;
+  };
+  Measured measure_within(double at);
+  Measured advance_divided(double begin, double h, int halvings, const Measured& first);
   [[nodiscard]] bool creates_energy(const Energies& before, const core::Ledger& ledger, const Energies& now) const;
   void book_contacts();
   void book_implicit(double end, double h);
