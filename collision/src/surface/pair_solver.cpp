@@ -573,6 +573,20 @@ void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> soft
   }
 }
 
+/// One search for all pairs of a body, but where it is met with others as one.
+PairSolver::SharedApex PairSolver::shared_apex(const Job& job, std::size_t side, std::span<const std::uint32_t> partners) {
+  const std::uint32_t body = side == 0 ? job.pair.a : job.pair.b;
+  const bool alone = &(side == 0 ? job.a : job.b) == &job.bodies[body];
+  const auto known = std::find_if(shared_apex_.begin(), shared_apex_.end(), [body](const SharedApex& shared) { return shared.body == body; });
+  if (alone && known != shared_apex_.end()) return *known;
+  others_.clear();
+  for (const std::uint32_t c : partners) others_.push_back(&job.bodies[c]);
+  SharedApex shared{.body = body, .apex = {}, .taker = 0};
+  shared.apex = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, job.settings().other_columns ? ApexRank::Next : ApexRank::Best, shared.taker);
+  if (alone) shared_apex_.push_back(shared);
+  return shared;
+}
+
 /// What a convex body loses to several others flows out of one place of it through Sigma of all its pairs: such sides need no region. Obstacles lose to
 /// each other what they do not press hardest on, which no Sigma bounds.
 void PairSolver::find_apexes(Job& job, const Partners& partners) {
@@ -582,12 +596,10 @@ void PairSolver::find_apexes(Job& job, const Partners& partners) {
     const std::uint32_t body = side == 0 ? job.pair.a : job.pair.b, other = job.pair.a + job.pair.b - body;
     const auto fixed = [&job](std::uint32_t c) { return job.bodies[c].fixed; };
     if (fixed(body) && std::any_of(third_.begin(), third_.end(), fixed)) continue;
-    others_.clear();
-    for (const std::uint32_t c : partners.of(body)) others_.push_back(&job.bodies[c]);
-    std::size_t taker = 0;
-    apex_[side] = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, job.settings().other_columns ? ApexRank::Next : ApexRank::Best, taker);
+    const SharedApex shared = shared_apex(job, side, partners.of(body));
+    apex_[side] = shared.apex;
     if (!apex_[side]) continue;
-    const std::uint32_t by = partners.of(body)[taker];
+    const std::uint32_t by = partners.of(body)[shared.taker];
     apex_[side]->lost = apex_[side]->lost && (by == other || (team_ != nullptr && fixed(other) && std::binary_search(team_->member.begin(), team_->member.end(), by)));
     job.polar.regions[side] = Region::None;
   }
