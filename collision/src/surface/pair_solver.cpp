@@ -500,7 +500,8 @@ void PairSolver::choose(const Job& job, PairResult& out) {
 /// not be better.
 double PairSolver::region_error(const ContactSettings& settings) {
   constexpr double kFinest = 1e-4, kFinestOfOther = 1e-5, kToShare = 1e-2;
-  return std::max(settings.error, !settings.energy ? kToShare : settings.other_columns ? kFinestOfOther : kFinest);
+  constexpr double kOfCells = 4.0;   // two orders of cells differ by far more than the finer one is off by
+  return std::max({settings.error, std::min(kOfCells * settings.error, kToShare), !settings.energy ? kToShare : settings.other_columns ? kFinestOfOther : kFinest});
 }
 
 /// Squeezed regions that columns from Sigma may not hold, or whose Sigma is worse than asked, are filled as they are.
