@@ -500,16 +500,16 @@ void PairSolver::choose(const Job& job, PairResult& out) {
 /// not be better.
 double PairSolver::region_error(const ContactSettings& settings) {
   constexpr double kFinest = 1e-4, kFinestOfOther = 1e-5, kToShare = 1e-2;
-  constexpr double kOfCells = 4.0;   // two orders of cells differ by far more than the finer one is off by
-  return std::max({settings.error, std::min(kOfCells * settings.error, kToShare), !settings.energy ? kToShare : settings.other_columns ? kFinestOfOther : kFinest});
+  return std::max(settings.error, !settings.energy ? kToShare : settings.other_columns ? kFinestOfOther : kFinest);
 }
 
 /// Squeezed regions that columns from Sigma may not hold, or whose Sigma is worse than asked, are filled as they are.
 void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
   constexpr double kPoor = 1e-3;
-  const double error = region_error(job.settings());
+  constexpr double kOfCells = 4.0, kCoarsest = 1e-2;  // what is left of a body is known to far less than two orders of cells differ by
+  const double asked = region_error(job.settings()), error = std::max(asked, std::min(kOfCells * job.settings().error, kCoarsest));
   PatchPoints& points = out.points;
-  const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, error);
+  const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, asked);
   const bool cut = job.settings().energy && cut_by_thirds_;
   for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || cut || points.unsure[side]);
   if (points.point.empty() || !(points.unsure[0] || points.unsure[1])) return;
