@@ -215,14 +215,23 @@ std::optional<PairSolver::Taken> PairSolver::taken_by_imprints(const Job& job, c
   Taken taken;
   for (const ContactBody* const third : third_bodies_) {
     if (!third->field.convex()) return std::nullopt;  // it may have several imprints on a patch
+    bool found = false;
     for (const PolarCover& cover : patches_.covers()) {
       const std::optional<Vec3> inside = imprint_.find(job.polar.pressure, cover, *third, 0.0);
       if (!inside) continue;
+      found = true;
       const std::optional<ImprintSize> size = imprint_.measure(job.polar.pressure, cover, *third, *inside);
       if (!size) return std::nullopt;
       taken.area += size->share;
       taken.force += size->share * size->pressure * out.summary.area / out.load;
       if (!(kOfSize * taken.area <= job.settings().error)) return std::nullopt;
+    }
+    if (found) continue;
+    // It may press beside where it is looked for, as next to a kink.
+    value_.resize(out.points.point.size());
+    third->field.evaluate(out.points.point, value_);
+    for (std::size_t i = 0; i < value_.size(); ++i) {
+      if (third->material.modulus * value_[i] > out.points.pressure[i]) return std::nullopt;
     }
   }
   return taken;
