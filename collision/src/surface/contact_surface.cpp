@@ -112,6 +112,7 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
     const std::size_t count = std::min(kPortion, pairs - job.first);
     executor.for_blocks(count, kPairsTogether, [&job](std::size_t begin, std::size_t end) {
       thread_local PairSolver solver;
+      solver.forget();
       Extent block;
       for (std::size_t k = begin; k < end; ++k) {
         solver.solve(job.query, job.first + k, job.results[k]);

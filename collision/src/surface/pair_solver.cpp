@@ -216,14 +216,23 @@ std::optional<PairSolver::Taken> PairSolver::taken_by_imprints(const Job& job, c
   Taken taken;
   for (const ContactBody* const third : third_bodies_) {
     if (!third->field.convex()) return std::nullopt;  // it may have several imprints on a patch
+    bool found = false;
     for (const PolarCover& cover : patches_.covers()) {
       const std::optional<Vec3> inside = imprint_.find(job.polar.pressure, cover, *third, 0.0);
       if (!inside) continue;
+      found = true;
       const std::optional<ImprintSize> size = imprint_.measure(job.polar.pressure, cover, *third, *inside);
       if (!size) return std::nullopt;
       taken.area += size->share;
       taken.force += size->share * size->pressure * out.summary.area / out.load;
       if (!(kOfSize * taken.area <= job.settings().error)) return std::nullopt;
+    }
+    if (found) continue;
+    // It may press beside where it is looked for, as next to a kink.
+    value_.resize(out.points.point.size());
+    third->field.evaluate(out.points.point, value_);
+    for (std::size_t i = 0; i < value_.size(); ++i) {
+      if (third->material.modulus * value_[i] > out.points.pressure[i]) return std::nullopt;
     }
   }
   return taken;
@@ -507,9 +516,10 @@ double PairSolver::region_error(const ContactSettings& settings) {
 /// Squeezed regions that columns from Sigma may not hold, or whose Sigma is worse than asked, are filled as they are.
 void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
   constexpr double kPoor = 1e-3;
-  const double error = region_error(job.settings());
+  constexpr double kOfCells = 4.0, kCoarsest = 1e-2;  // what is left of a body is known to far less than two orders of cells differ by
+  const double asked = region_error(job.settings()), error = std::max(asked, std::min(kOfCells * job.settings().error, kCoarsest));
   PatchPoints& points = out.points;
-  const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, error);
+  const bool poor = out.summary.rule == ContactRule::March && out.summary.error_estimate > std::max(kPoor, asked);
   const bool cut = job.settings().energy && cut_by_thirds_;
   for (const std::size_t side : {0u, 1u}) points.unsure[side] = job.polar.regions[side] != Region::None && (poor || cut || points.unsure[side]);
   if (points.point.empty() || !(points.unsure[0] || points.unsure[1])) return;
@@ -574,6 +584,20 @@ void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> soft
   }
 }
 
+/// One search for all pairs of a body, but where it is met with others as one.
+PairSolver::SharedApex PairSolver::shared_apex(const Job& job, std::size_t side, std::span<const std::uint32_t> partners) {
+  const std::uint32_t body = side == 0 ? job.pair.a : job.pair.b;
+  const bool alone = &(side == 0 ? job.a : job.b) == &job.bodies[body];
+  const auto known = std::find_if(shared_apex_.begin(), shared_apex_.end(), [body](const SharedApex& shared) { return shared.body == body; });
+  if (alone && known != shared_apex_.end()) return *known;
+  others_.clear();
+  for (const std::uint32_t c : partners) others_.push_back(&job.bodies[c]);
+  SharedApex shared{.body = body, .apex = {}, .taker = 0};
+  shared.apex = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, job.settings().other_columns ? ApexRank::Next : ApexRank::Best, shared.taker);
+  if (alone) shared_apex_.push_back(shared);
+  return shared;
+}
+
 /// What a convex body loses to several others flows out of one place of it through Sigma of all its pairs: such sides need no region. Obstacles lose to
 /// each other what they do not press hardest on, which no Sigma bounds.
 void PairSolver::find_apexes(Job& job, const Partners& partners) {
@@ -583,12 +607,10 @@ void PairSolver::find_apexes(Job& job, const Partners& partners) {
     const std::uint32_t body = side == 0 ? job.pair.a : job.pair.b, other = job.pair.a + job.pair.b - body;
     const auto fixed = [&job](std::uint32_t c) { return job.bodies[c].fixed; };
     if (fixed(body) && std::any_of(third_.begin(), third_.end(), fixed)) continue;
-    others_.clear();
-    for (const std::uint32_t c : partners.of(body)) others_.push_back(&job.bodies[c]);
-    std::size_t taker = 0;
-    apex_[side] = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, job.settings().other_columns ? ApexRank::Next : ApexRank::Best, taker);
+    const SharedApex shared = shared_apex(job, side, partners.of(body));
+    apex_[side] = shared.apex;
     if (!apex_[side]) continue;
-    const std::uint32_t by = partners.of(body)[taker];
+    const std::uint32_t by = partners.of(body)[shared.taker];
     apex_[side]->lost = apex_[side]->lost && (by == other || (team_ != nullptr && fixed(other) && std::binary_search(team_->member.begin(), team_->member.end(), by)));
     job.polar.regions[side] = Region::None;
   }

@@ -41,6 +41,8 @@ struct ContactQuery {
 /// The solver of one thread; its buffers are reused.
 class PairSolver {
  public:
+  /// Before pairs of other bodies, or of bodies that have moved: what pairs of a body share is not known of these.
+  void forget() { shared_apex_.clear(); }
   /// @param k  of the candidate pairs
   void solve(const ContactQuery& query, std::size_t k, PairResult& out);
 
@@ -64,6 +66,13 @@ class PairSolver {
   enum class Pressing : std::uint8_t { None, Some, All };
   Pressing thirds_press(const Job& job, const PairResult& out);
   bool thirds_press_beside(const Job& job, const PairResult& out);
+  /// What find_shared_apex said of a body.
+  struct SharedApex {
+    std::uint32_t body;
+    std::optional<Apex> apex;
+    std::size_t taker;
+  };
+  SharedApex shared_apex(const Job& job, std::size_t side, std::span<const std::uint32_t> partners);
   void find_apexes(Job& job, const Partners& partners);
   void add_flows(const Job& job, PairResult& out);
   [[nodiscard]] static bool fills_regions(const Job& job) {
@@ -119,6 +128,7 @@ class PairSolver {
   std::vector<std::uint8_t> taken_;  ///< of points and rims, 1: a third body presses harder
   PressureBatch beside_;
   std::array<std::optional<Apex>, 2> apex_{};  ///< that what A, B lose to several bodies flows out of
+  std::vector<SharedApex> shared_apex_;
   std::vector<const ContactBody*> others_;
   bool cut_by_thirds_ = false;       ///< a third body may press harder on a part of Sigma, or of what the bodies lose
   std::optional<Taken> little_;      ///< where that is little

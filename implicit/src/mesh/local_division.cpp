@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <unordered_set>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "mesh/curved_middle.h"
 #include "mesh/error_search.h"
 #include "mesh/triangle_crossings.h"
+#include "supple/core/error.h"
 #include "supple/implicit/project.h"
 
 namespace supple::implicit {
@@ -32,27 +34,49 @@ std::uint64_t key_of(std::uint32_t a, std::uint32_t b) { return std::uint64_t{st
 
 std::size_t next(std::size_t corner) { return corner == 2 ? 0 : corner + 1; }
 
-/// Against the normals of its vertices.
-bool is_inverted(const Mesh& mesh, const Corners& t) {
-  const Vec3 area = (mesh.position[t[1]] - mesh.position[t[0]]).cross(mesh.position[t[2]] - mesh.position[t[0]]);
-  return !(area.dot(mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]]) > 0.0);
+double twice_area(const Mesh& mesh, const Corners& t) {
+  const Vec3& p = mesh.position[t[0]];
+  return (mesh.position[t[1]] - p).cross(mesh.position[t[2]] - p).norm();
 }
 
+/// A mesh, the errors of its triangles [m], the edges whose middles are not on the surface, and by vertex, 1: it is on a crease.
+struct Measured {
+  Mesh& mesh;
+  std::vector<double> error;
+  std::vector<Edge> off;
+  std::vector<std::uint8_t> on_crease;
+};
+
 /// Whether a triangle is to be divided: its error exceeds the goal, or, where the surface bends so much in it that shading by its normals shows it, an
-/// eighth of the goal.
-bool is_coarse(const Mesh& mesh, const Corners& t, double error, double goal) {
+/// eighth of the goal. Vertices on creases have normals of no side.
+bool is_coarse(const Measured& of, std::size_t n, double goal) {
   constexpr double kCosine = 0.87, kShare = 0.125;  // of 30 degrees
-  const Vec3 &p = mesh.normal[t[0]], &q = mesh.normal[t[1]], &r = mesh.normal[t[2]];
-  return error > goal || (error > kShare * goal && std::min({p.dot(q), q.dot(r), r.dot(p)}) < kCosine);
+  if (of.error[n] > goal) return true;
+  if (!(of.error[n] > kShare * goal)) return false;
+  const Corners& t = of.mesh.triangle[n];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::uint32_t a = t[k], b = t[next(k)];
+    if (of.on_crease[a] == 0 && of.on_crease[b] == 0 && of.mesh.normal[a].dot(of.mesh.normal[b]) < kCosine) return true;
+  }
+  return false;
 }
 
 bool share_an_edge(const Corners& s, const Corners& t) {
   return std::count_if(s.begin(), s.end(), [&](std::uint32_t v) { return v == t[0] || v == t[1] || v == t[2]; }) >= 2;
 }
 
-/// The same edge for both of its triangles where lengths are equal.
-std::size_t longest_edge(const Mesh& mesh, const Corners& t) {
-  const auto length = [&](std::size_t k) { return (mesh.position[t[k]] - mesh.position[t[next(k)]]).squaredNorm(); };
+/// Whether an edge runs from one side of a crease to another, as far as the normals at its ends tell.
+bool runs_across(const Measured& of, std::uint32_t a, std::uint32_t b) {
+  constexpr double kAcross = 0.5;  // cosine of 60 degrees
+  return of.on_crease[a] == 0 && of.on_crease[b] == 0 && of.mesh.normal[a].dot(of.mesh.normal[b]) < kAcross;
+}
+
+/// The same edge for both of its triangles where lengths are equal. Those across creases count as twice as long, so that they are divided at the crease first.
+std::size_t longest_edge(const Measured& of, const Corners& t) {
+  constexpr double kOfCrease = 4.0;  // of the square
+  const auto length = [&](std::size_t k) {
+    return (runs_across(of, t[k], t[next(k)]) ? kOfCrease : 1.0) * (of.mesh.position[t[k]] - of.mesh.position[t[next(k)]]).squaredNorm();
+  };
   const auto longer = [&](std::size_t k, std::size_t l) {
     const double of_k = length(k), of_l = length(l);
     return of_k != of_l ? of_k > of_l : key_of(t[k], t[next(k)]) < key_of(t[l], t[next(l)]);
@@ -61,19 +85,71 @@ std::size_t longest_edge(const Mesh& mesh, const Corners& t) {
   return longer(2, k) ? 2 : k;
 }
 
-/// A mesh, the errors of its triangles [m], and its vertices that are not on the surface.
-struct Measured {
-  Mesh& mesh;
-  std::vector<double> error;
-  std::vector<std::uint32_t> off;
+/// Against the normals of its vertices, which do not tell where it crosses a crease.
+bool is_inverted(const Measured& of, const Corners& t) {
+  if (runs_across(of, t[0], t[1]) || runs_across(of, t[1], t[2]) || runs_across(of, t[2], t[0])) return false;
+  const Mesh& mesh = of.mesh;
+  const Vec3 area = (mesh.position[t[1]] - mesh.position[t[0]]).cross(mesh.position[t[2]] - mesh.position[t[0]]);
+  return !(area.dot(mesh.normal[t[0]] + mesh.normal[t[1]] + mesh.normal[t[2]]) > 0.0);
+}
+
+/// A place of the surface.
+struct Foot {
+  Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
 };
+
+/// Where the surface is met above or below a place. @param up  unit   @param farthest  from there [m]
+std::optional<Foot> foot_along(const FieldView& field, const Vec3& place, const Vec3& up, double farthest) {
+  constexpr double kFirst = 0x1p-4;  // step, over the farthest one
+  const double value = field.value(place), sign = value > 0.0 ? 1.0 : -1.0;
+  for (double step = kFirst * farthest; step <= farthest; step *= 2.0) {
+    const Vec3 there = place + sign * step * up;
+    if ((field.value(there) > 0.0) == (value > 0.0)) continue;
+    Foot foot{.point = root_on_segment(field, place, there)};
+    Vec3 slope;
+    static_cast<void>(field.value(foot.point, slope));
+    if (!(slope.squaredNorm() > 0.0)) return std::nullopt;
+    foot.normal = -slope.normalized();
+    return foot;
+  }
+  return std::nullopt;
+}
+
+/// Where the surface has a crease between two places of it, by halving of the way from one to the other: the normals of both stay apart.
+struct Crease {
+  Foot foot;        ///< with the mean of the normals of both sides
+  double at = 0.0;  ///< on the way, 0..1
+};
+std::optional<Crease> find_crease(const FieldView& field, const Foot& one, const Foot& other) {
+  constexpr int kHalvings = 12;
+  constexpr double kSmooth = 0.985;  // cosine of 10 degrees
+  const Vec3 way = other.point - one.point, sum = one.normal + other.normal;
+  const double length = way.norm();
+  Vec3 up = sum - sum.dot(way) / way.squaredNorm() * way;
+  if (!(up.norm() > 0.0)) return std::nullopt;
+  up.normalize();
+  Vec3 normal_low = one.normal, normal_high = other.normal, point = one.point;
+  double low = 0.0, high = 1.0;
+  for (int k = 0; k < kHalvings; ++k) {
+    if (normal_low.dot(normal_high) > kSmooth) return std::nullopt;
+    const double middle = 0.5 * (low + high);
+    const std::optional<Foot> foot = foot_along(field, one.point + middle * way, up, 2.0 * length);
+    if (!foot) return std::nullopt;
+    const bool lower = foot->normal.dot(normal_low) > foot->normal.dot(normal_high);
+    (lower ? low : high) = middle;
+    (lower ? normal_low : normal_high) = foot->normal;
+    point = foot->point;
+  }
+  if (normal_low.dot(normal_high) > kSmooth || !((normal_low + normal_high).norm() > 0.0)) return std::nullopt;
+  return Crease{{point, (normal_low + normal_high).normalized()}, 0.5 * (low + high)};
+}
 
 /// One round: every coarse triangle is divided into four.
 class Round {
  public:
   /// @param reach  of a vertex that moves onto the surface [m]
   Round(const FieldView& field, const Executor& executor, double goal, double reach, Measured& of)
-      : field_(field), executor_(executor), goal_(goal), reach_(reach), mesh_(of.mesh), error_(of.error), off_(of.off), old_(of.mesh.vertex_count()) {
+      : field_(field), executor_(executor), goal_(goal), reach_(reach), mesh_(of.mesh), error_(of.error), off_(of.off), of_(of), old_(of.mesh.vertex_count()) {
     choose_edges();
   }
   /// After it.
@@ -86,7 +162,9 @@ class Round {
   struct Mover {
     std::uint32_t vertex = 0;
     Vec3 start = Vec3::Zero(), home = Vec3::Zero();  ///< of Newton's method; where it stays otherwise
-    bool moved = false;
+    std::uint32_t a = kNone, b = kNone;              ///< of the edge that it divides
+    std::optional<Foot> foot{};                      ///< where it goes
+    bool on_crease = false, moved = false;
   };
   void choose_edges();
   void list_movers();
@@ -95,6 +173,8 @@ class Round {
   /// Puts vertices of triangles that are inverted or intersect others back. @param changed  triangles to test; receives those that this changed
   void take_back(std::vector<std::uint32_t>& changed);
   void put_back(Mover& mover);
+  [[nodiscard]] std::optional<Foot> crease_on(const Mover& mover) const;
+  void find_foot(Mover& mover) const;
   [[nodiscard]] bool is_near(const Vec3& p) const;
   [[nodiscard]] std::uint32_t middle_of(std::uint32_t a, std::uint32_t b) const;
 
@@ -103,7 +183,8 @@ class Round {
   double goal_, reach_;  ///< [m]
   Mesh& mesh_;
   std::vector<double>& error_;
-  std::vector<std::uint32_t>& off_;
+  std::vector<Edge>& off_;
+  Measured& of_;
   std::size_t old_;                     ///< vertices
   std::vector<Edge> edge_;              ///< sorted; the middles follow the old vertices in this order
   std::vector<Mover> mover_;
@@ -119,7 +200,7 @@ void Round::choose_edges() {
     return chosen.insert(key_of(t[k], t[next(k)])).second;
   };
   for (std::size_t n = 0; n < mesh_.triangle_count(); ++n) {
-    if (!is_coarse(mesh_, mesh_.triangle[n], error_[n], goal_)) continue;
+    if (!is_coarse(of_, n, goal_)) continue;
     for (std::size_t k = 0; k < 3; ++k) choose(mesh_.triangle[n], k);
   }
   for (bool more = !chosen.empty(); more;) {
@@ -127,7 +208,7 @@ void Round::choose_edges() {
     for (const Corners& t : mesh_.triangle) {
       if (at_end[t[0]] + at_end[t[1]] + at_end[t[2]] < 2) continue;
       const auto is_chosen = [&](std::size_t k) { return chosen.contains(key_of(t[k], t[next(k)])); };
-      if (is_chosen(0) || is_chosen(1) || is_chosen(2)) more |= choose(t, longest_edge(mesh_, t));
+      if (is_chosen(0) || is_chosen(1) || is_chosen(2)) more |= choose(t, longest_edge(of_, t));
     }
   }
   for (const std::uint64_t key : chosen) edge_.push_back({static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)});
@@ -145,16 +226,22 @@ void Round::list_movers() {
   mesh_.position.resize(old_ + edge_.size());
   mesh_.normal.resize(old_ + edge_.size());
   moves_.assign(mesh_.vertex_count(), kNone);
-  const auto add = [&](std::uint32_t vertex, const Vec3& start, const Vec3& home) {
-    moves_[vertex] = static_cast<std::uint32_t>(mover_.size());
-    mover_.push_back({vertex, start, home});
-    mesh_.position[vertex] = home;
+  of_.on_crease.resize(mesh_.vertex_count(), 0);
+  const auto add = [&](const Mover& mover) {
+    moves_[mover.vertex] = static_cast<std::uint32_t>(mover_.size());
+    mover_.push_back(mover);
+    mesh_.position[mover.vertex] = mover.home;
   };
-  for (const std::uint32_t v : off_) add(v, mesh_.position[v], mesh_.position[v]);
+  for (const Edge& edge : off_) add({.vertex = edge.middle, .start = mesh_.position[edge.middle], .home = mesh_.position[edge.middle], .a = edge.a, .b = edge.b});
   for (const Edge& edge : edge_) {
     const Vec3 &a = mesh_.position[edge.a], &b = mesh_.position[edge.b];
     mesh_.normal[edge.middle] = mesh_.normal[edge.a];
-    add(edge.middle, curved_middle(a, mesh_.normal[edge.a], b, mesh_.normal[edge.b]), 0.5 * (a + b));
+    const bool smooth = of_.on_crease[edge.a] == 0 && of_.on_crease[edge.b] == 0;
+    add({.vertex = edge.middle,
+         .start = smooth ? curved_middle(a, mesh_.normal[edge.a], b, mesh_.normal[edge.b]) : Vec3(0.5 * (a + b)),
+         .home = 0.5 * (a + b),
+         .a = edge.a,
+         .b = edge.b});
   }
 }
 
@@ -165,25 +252,56 @@ bool Round::is_near(const Vec3& p) const {
   return std::abs(value) < kShare * goal_ * slope.norm();
 }
 
+/// Where the edge of a mover crosses a crease, not near an end; of an edge between two places of creases, beside its middle.
+std::optional<Foot> Round::crease_on(const Mover& mover) const {
+  constexpr double kCosine = 0.97, kNearEnd = 0.2, kBeside = 0.125;  // of 14 degrees; of the edge
+  const auto foot_of = [&](std::uint32_t v) { return Foot{mesh_.position[v], mesh_.normal[v]}; };
+  const Foot a = foot_of(mover.a), b = foot_of(mover.b);
+  const int ends = of_.on_crease[mover.a] + of_.on_crease[mover.b];
+  if (ends == 1) return std::nullopt;
+  if (ends == 0) {
+    if (a.normal.dot(b.normal) > kCosine) return std::nullopt;
+    const std::optional<Crease> crease = find_crease(field_, a, b);
+    if (!crease || crease->at < kNearEnd || crease->at > 1.0 - kNearEnd) return std::nullopt;
+    return crease->foot;
+  }
+  const Vec3 aside = kBeside * (b.point - a.point).cross(a.normal + b.normal).normalized() * (b.point - a.point).norm();
+  const Projection one = project_to_surface(field_, mover.home - aside), other = project_to_surface(field_, mover.home + aside);
+  if (!one.converged || !other.converged || one.normal.dot(other.normal) > kCosine) return std::nullopt;
+  const std::optional<Crease> crease = find_crease(field_, {one.point, one.normal}, {other.point, other.normal});
+  return crease ? std::optional(crease->foot) : std::nullopt;
+}
+
+/// Where a mover goes, if it reaches the surface. Reads the mesh alone.
+void Round::find_foot(Mover& mover) const {
+  mover.foot = crease_on(mover);
+  mover.on_crease = mover.foot && (mover.foot->point - mover.home).squaredNorm() <= reach_ * reach_;
+  if (mover.on_crease) return;
+  const Projection foot = project_to_surface(field_, mover.start);
+  // In a valley Newton's method may go to and fro between its sides.
+  const bool reaches = (foot.converged || is_near(foot.point)) && (foot.point - mover.home).squaredNorm() <= reach_ * reach_;
+  mover.foot = reaches ? std::optional(Foot{foot.point, foot.normal}) : std::nullopt;
+}
+
 void Round::move() {
   executor_.for_blocks(mover_.size(), kTrianglesPerTask, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      Mover& mover = mover_[i];
-      const Projection foot = project_to_surface(field_, mover.start);
-      // In a valley Newton's method may go to and fro between its sides.
-      if ((!foot.converged && !is_near(foot.point)) || (foot.point - mover.home).squaredNorm() > reach_ * reach_) {
-        put_back(mover);
-        continue;
-      }
-      mesh_.position[mover.vertex] = foot.point;
-      mesh_.normal[mover.vertex] = foot.normal;
-      mover.moved = true;
-    }
+    for (std::size_t i = begin; i < end; ++i) find_foot(mover_[i]);
   });
+  for (Mover& mover : mover_) {
+    if (!mover.foot) {
+      put_back(mover);
+      continue;
+    }
+    mesh_.position[mover.vertex] = mover.foot->point;
+    mesh_.normal[mover.vertex] = mover.foot->normal;
+    of_.on_crease[mover.vertex] = mover.on_crease ? 1 : 0;
+    mover.moved = true;
+  }
 }
 
 void Round::put_back(Mover& mover) {
   mesh_.position[mover.vertex] = mover.home;
+  of_.on_crease[mover.vertex] = 0;
   Vec3 slope;
   static_cast<void>(field_.value(mover.home, slope));
   if (slope.squaredNorm() > 0.0) mesh_.normal[mover.vertex] = -slope.normalized();
@@ -199,7 +317,7 @@ void Round::divide_triangles() {
   for (const Edge& edge : edge_) at_end[edge.a] = at_end[edge.b] = 1;
   for (std::size_t n = 0; n < mesh_.triangle_count(); ++n) {
     const Corners& t = mesh_.triangle[n];
-    const std::size_t k = at_end[t[0]] + at_end[t[1]] + at_end[t[2]] < 2 ? 0 : longest_edge(mesh_, t);
+    const std::size_t k = at_end[t[0]] + at_end[t[1]] + at_end[t[2]] < 2 ? 0 : longest_edge(of_, t);
     const std::uint32_t a = t[k], b = t[next(k)], c = t[next(next(k))], ab = middle_of(a, b);
     if (ab == kNone) {  // then no other edge is divided
       const bool moves = std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return moves_[v] != kNone; });
@@ -252,7 +370,7 @@ void Round::take_back(std::vector<std::uint32_t>& changed) {
   for (const std::uint32_t n : changed) {
     const Corners& t = mesh_.triangle[n];
     is_changed[n] = 1;
-    if (is_inverted(mesh_, t)) add_farthest(std::span(&t, 1), back);
+    if (is_inverted(of_, t)) add_farthest(std::span(&t, 1), back);
   }
   const TriangleBoxes boxes(mesh_.position, mesh_.triangle, changed);
   std::vector<std::vector<std::uint32_t>> found((mesh_.triangle_count() + kTrianglesPerTask - 1) / kTrianglesPerTask);
@@ -289,7 +407,7 @@ void Round::divide() {
   for (std::vector<std::uint32_t> changed = part_; !changed.empty();) take_back(changed);
   off_.clear();
   for (const Mover& mover : mover_) {
-    if (!mover.moved) off_.push_back(mover.vertex);
+    if (!mover.moved) off_.push_back({mover.a, mover.b, mover.vertex});
   }
 }
 
@@ -297,7 +415,7 @@ void Round::divide() {
 /// Newton's method leads to. Of `every` triangles one, from `first` on.
 void measure(const FieldView& field, Measured& of, const Executor& executor, std::size_t first = 0, std::size_t every = 1) {
   std::vector<std::uint8_t> is_off(of.mesh.vertex_count(), 0);
-  for (const std::uint32_t v : of.off) is_off[v] = 1;
+  for (const Edge& edge : of.off) is_off[edge.middle] = 1;
   std::vector<std::uint32_t> on, off;
   for (std::size_t n = first; n < of.error.size(); n += every) {
     if (of.error[n] >= 0.0) continue;
@@ -323,14 +441,16 @@ void measure(const FieldView& field, Measured& of, const Executor& executor, std
 
 }  // namespace
 
-const Mesh* LocalDivision::divide(const FieldView& field, const Mesh& from, double goal, std::size_t most, const Executor& executor) {
+const Mesh* LocalDivision::divide(const FieldView& field, const Mesh& from, double goal, std::size_t most, const Executor& executor, std::size_t on_creases) {
+  SUPPLE_EXPECTS(on_creases <= from.vertex_count());
   mesh_ = from;
   double reach2 = 0.0;
   for (const Corners& t : mesh_.triangle) {
     for (std::size_t k = 0; k < 3; ++k) reach2 = std::max(reach2, (mesh_.position[t[k]] - mesh_.position[t[next(k)]]).squaredNorm());
   }
-  Measured of{mesh_, std::vector<double>(mesh_.triangle_count(), -1.0), {}};
-  const auto coarse = [&](std::size_t n) { return of.error[n] >= 0.0 && is_coarse(mesh_, mesh_.triangle[n], of.error[n], goal); };
+  Measured of{mesh_, std::vector<double>(mesh_.triangle_count(), -1.0), {}, std::vector<std::uint8_t>(mesh_.vertex_count(), 0)};
+  std::fill(of.on_crease.end() - static_cast<std::ptrdiff_t>(on_creases), of.on_crease.end(), std::uint8_t{1});
+  const auto coarse = [&](std::size_t n) { return of.error[n] >= 0.0 && is_coarse(of, n, goal); };
   const auto count_coarse = [&] {
     std::size_t count = 0;
     for (std::size_t n = 0; n < mesh_.triangle_count(); ++n) count += coarse(n) ? 1 : 0;
@@ -342,9 +462,17 @@ const Mesh* LocalDivision::divide(const FieldView& field, const Mesh& from, doub
     measure(field, of, executor, part, kParts);
     if (mesh_.triangle_count() + 3 * count_coarse() > most) return nullptr;
   }
-  std::size_t last = mesh_.triangle_count(), before = last;  // coarse triangles of the last two rounds
-  for (std::size_t count; (count = count_coarse()) > 0; measure(field, of, executor)) {
-    if (count > 2 * std::exchange(before, std::exchange(last, count))) return nullptr;  // some do not reach the surface
+  const auto coarse_area = [&] {
+    double twice = 0.0;
+    for (std::size_t n = 0; n < mesh_.triangle_count(); ++n) twice += coarse(n) ? twice_area(mesh_, mesh_.triangle[n]) : 0.0;
+    return 0.5 * twice;
+  };
+  // Across a crease they get twice as many in each round, and half as wide.
+  constexpr double kGain = 0.35;  // of the area in two rounds: a quarter, and what may be lost where they are divided anew beside it
+  double last = std::numeric_limits<double>::infinity(), before = last;  // area of the coarse triangles before the last two rounds
+  for (; count_coarse() > 0; measure(field, of, executor)) {
+    const double area = coarse_area();
+    if (area >= kGain * std::exchange(before, std::exchange(last, area))) return nullptr;  // some do not reach the surface
     Round round(field, executor, goal, std::sqrt(reach2), of);
     if (round.triangle_count() > most) return nullptr;
     round.divide();

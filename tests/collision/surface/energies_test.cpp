@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -59,6 +61,66 @@ TEST(EnergyEstimates, AreAboutTheErrorAskedForAtMost) {
     }
   }
   EXPECT_GE(pairs, 20);
+}
+
+// A rod presses on the patch of another one and an ellipsoid beside a kink, where no imprint is found from the middle of the patch.
+TEST(ForcesOfSeveral, LeaveOutWhatAThirdBodyTakesBesideAKink) {
+  constexpr double kOfCells = 6e-3;  // of the load: what sums over cells leave
+  const BodiesInOnePlace place(3, 10155);
+  const std::vector<ContactBody> bodies = place.bodies();
+  const LostVolumes exact = lost_volumes(bodies, 96);
+  TimedQuery query;
+  for (const double error : {1e-2, 1e-3, 1e-4}) {
+    const ContactsOfBodies found(bodies.size(), query.ask(bodies, error));
+    for (std::size_t b = 0; b < bodies.size(); ++b) EXPECT_LE((found.force[b] - exact.force[b]).norm(), kOfCells * exact.load[b] + found.off[b]) << b << ' ' << error;
+  }
+}
+
+/// Field evaluations of all pairs of a group; none where one is marched, or where no third body takes part.
+std::optional<double> evaluations_of(std::span<const ContactBody> bodies, bool energy) {
+  ContactCandidates candidates;
+  ContactSurface surface;
+  const Executor executor(1);
+  find_contacts(bodies, broad_phase(bodies, {}, executor), executor, candidates);
+  solve_contact_surface(bodies, candidates, {.error = 1e-3, .energy = energy}, executor, surface);
+  if (surface.summary.size() < 2) return std::nullopt;
+  double sum = 0.0;
+  for (const ContactSurface::Summary& s : surface.summary) {
+    if (s.rule != ContactRule::Polar) return std::nullopt;
+    sum += static_cast<double>(s.evaluations);
+  }
+  return sum;
+}
+
+// All pairs of a body share one search for its apex, and panels are not divided where its pressure hardly falls along a column.
+TEST(EnergiesOfSeveral, TakeAFewTimesTheEvaluationsOfForces) {
+  int groups = 0;
+  for (std::uint64_t seed = 9917; seed < 9943; ++seed) {
+    const BodiesInOnePlace place(3, seed);
+    const std::vector<ContactBody> bodies = place.bodies();
+    const std::optional<double> forces = evaluations_of(bodies, false), energies = evaluations_of(bodies, true);
+    if (!forces || !energies) continue;
+    ++groups;
+    EXPECT_LT(*energies, 8.0 * *forces) << seed;
+  }
+  EXPECT_GE(groups, 7);
+}
+
+// At an error that coarse meshes meet, marching takes no finer ones.
+TEST(Marching, TakesFewerPointsAtCoarserErrors) {
+  std::array<std::size_t, 2> points{};
+  TimedQuery query;
+  for (std::uint64_t seed = 9917; seed < 9927; ++seed) {
+    const BodiesInOnePlace place(3, seed);
+    const std::vector<ContactBody> bodies = place.bodies();
+    for (const std::size_t k : {0u, 1u}) {
+      for (const ContactSurface::Summary& s : query.ask(bodies, k == 0 ? 1e-3 : 1e-4)) {
+        EXPECT_LE(s.error_estimate, k == 0 ? 1.01e-3 : 1.01e-4) << seed;
+        points[k] += s.rule == ContactRule::March ? s.points : 0;
+      }
+    }
+  }
+  EXPECT_LT(static_cast<double>(points[0]), 0.5 * static_cast<double>(points[1]));
 }
 
 TEST(EnergyEstimates, AreNoneWithoutContact) {

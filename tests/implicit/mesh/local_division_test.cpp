@@ -116,6 +116,69 @@ TEST(LocalDivision, EndsWhereVerticesDoNotReachTheSurface) {
   EXPECT_EQ(division.divide(field, from, 0.25 * centroid_error(field, from, Executor(2)), 10 * from.triangle_count(), Executor(2)), nullptr);
 }
 
+// Across a crease triangles are off by their width, not by its square, and get more in each round. They end on the crease instead.
+TEST(LocalDivision, MeetsCreases) {
+  const double radius = 0.5, apart = 0.35, cell = 0.06;
+  const Vec3 axis = Vec3(0.8, 0.36, 0.48);
+  const FunctionField balls = either(sphere(apart * axis, radius), sphere(-apart * axis, radius));
+  const double rim = std::sqrt(radius * radius - apart * apart);
+  const auto to_rim = [&](const Vec3& p) { return std::hypot(p.dot(axis), (p - p.dot(axis) * axis).norm() - rim); };
+  const auto off = [&](const Vec3& p) {
+    const double along = p.dot(axis);
+    const Vec3 from = p - std::copysign(apart, along) * axis;
+    // The foot on the ball of this side is on the surface where it stays on this side of the middle plane.
+    const double foot = std::copysign(apart, along) + radius * from.dot(axis) / from.norm();
+    return (foot > 0.0) == (along > 0.0) ? std::min(to_rim(p), std::abs(from.norm() - radius)) : to_rim(p);
+  };
+  const Mesh from = march_cubes(balls, {.lattice = lattice_of(cell)}, Executor(2));
+  const auto largest = [&](const Mesh& mesh) {
+    double most = 0.0;
+    for (const auto& t : mesh.triangle) most = std::max(most, off(centroid(mesh, t)));
+    return most;
+  };
+  LocalDivision division;
+  std::size_t last = from.triangle_count();
+  for (const double goal : {1e-3, 2.5e-4}) {
+    ASSERT_GT(largest(from), 4.0 * goal);
+    const Mesh* mesh = division.divide(balls, from, goal, kAnyNumber, Executor(2));
+    ASSERT_NE(mesh, nullptr);
+    expect_closed(*mesh);
+    EXPECT_LE(largest(*mesh), goal);
+    EXPECT_EQ(self_intersections(*mesh, cell), 0u);
+    std::size_t on_rim = 0;
+    for (const Vec3& p : mesh->position) on_rim += to_rim(p) < 1e-3 * cell ? 1 : 0;
+    // Chords as long as their sagittas allow at least, and not even four times as many: edges are halved.
+    const double chord = std::sqrt(8.0 * rim * goal), fewest = 2.0 * std::numbers::pi * rim / chord;
+    EXPECT_GT(static_cast<double>(on_rim), 0.7 * fewest);
+    // A sphere at that error alone takes 4 pi R^2 / (sqrt(3) / 4 e^2) triangles with edges e^2 / 6 = R goal; halving takes up to four times as many.
+    const double area = 2.0 * 2.0 * std::numbers::pi * radius * (radius + apart), edge2 = 6.0 * radius * goal;
+    EXPECT_LT(static_cast<double>(mesh->triangle_count()), 4.0 * area / (0.25 * std::numbers::sqrt3 * edge2) + static_cast<double>(from.triangle_count()));
+    EXPECT_GT(mesh->triangle_count(), last);
+    last = mesh->triangle_count();
+    const std::uint64_t expected = hash_of(*mesh);
+    EXPECT_EQ(hash_of(*division.divide(balls, from, goal, kAnyNumber, Executor(5))), expected);
+  }
+}
+
+// The inside of a bend that is tight for its thickness is a crease, whose ends are smooth. Even triangles take 4.3 million at the second error.
+TEST(LocalDivision, LetsTheCellsOfACurveWithCreasesStayLarge) {
+  Primitive curve = wyvill_point(0.28);
+  curve.shape = ShapeKind::Curve;
+  curve.control = {Vec3(-0.25, -0.1, 0.0), Vec3(-0.1, 0.55, 0.0), Vec3(0.1, -0.55, 0.0), Vec3(0.25, 0.1, 0.0)};
+  curve.taper = 0.08 / 0.28;
+  for (const double shift : {0.0, 0.004}) {
+    const Body body = body_of({{curve, Vec3::Constant(shift)}});
+    for (const auto& [error, most] : {std::pair{2e-3, 8000u}, std::pair{6e-4, 32000u}, std::pair{2e-4, 64000u}}) {
+      MarchCounts counts;
+      const Mesh mesh = march_cubes(body.field, {.lattice = {}, .error = error}, Executor(2), &counts);
+      expect_closed(mesh);
+      EXPECT_LE(centroid_error(body.field, mesh, Executor(2)), error);
+      EXPECT_LT(mesh.triangle_count(), most) << error << ' ' << shift;
+      EXPECT_EQ(self_intersections(mesh, 0.02), 0u) << error << ' ' << shift;
+    }
+  }
+}
+
 // Even triangles would be as small everywhere as the smallest feature needs them.
 TEST(LocalDivision, LetsTheCellsOfALargeBodyWithSmallFeaturesStayLarge) {
   const std::vector<std::pair<Primitive, Vec3>> parts{{wyvill_point(1.0), Vec3::Zero()}, {wyvill_point(0.12), Vec3(0.5, 0.0, 0.1)}, {wyvill_point(0.08), Vec3(0.48, 0.1, 0.1)}};

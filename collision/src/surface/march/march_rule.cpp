@@ -30,7 +30,7 @@ constexpr int kFewNodes = 3;           // through a squeezed region
 constexpr double kWidest = 20.0;       // ends of columns, over where they begin
 constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
 
-int order_for(double error) { return error >= 5e-3 ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
+int order_for(double error) { return error >= 5e-4 ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
 
 }  // namespace
 
@@ -411,7 +411,8 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, double error
 
 /// The coarsest mesh, among halved cells, whose triangles are smooth wherever the bodies may press. @return whether there were not too many cells
 bool MarchRuleSolver::lay_mesh(PairPressure& pressure, Thirds third, const Box& overlap,
-                               const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat, int most_halvings) {
+                               const std::optional<CommonAxis>& axis, const std::optional<FlatCells>& flat, double error) {
+  const int most_halvings = error < kRough ? kMostHalvings : kRoughHalvings;
   const auto mesh = [&] {
     heed_scope();
     return mesher_.mesh(pressure, overlap, cell_, axis, flat, mesh_) && mesh_.triangle.size() <= kMostPieces / 2;
@@ -442,7 +443,7 @@ bool MarchRuleSolver::lay_mesh(PairPressure& pressure, Thirds third, const Box& 
     const auto& c = mesh_.triangle[p.triangle].corner;
     return std::any_of(c.begin(), c.end(), [this](std::uint32_t v) { return mesh_.at_end[v] != 0; });
   };
-  const auto fits = [&](const Piece& p) { return at_end(p) ? !presses_within(p, kBesideEnd) : smooth(p) || !presses_within(p, kBeside); };
+  const auto fits = [&](const Piece& p) { return at_end(p) ? !presses_within(p, kBesideEnd) : smooth(p, error) || !presses_within(p, kBeside); };
   for (int halvings = 0; halvings < most_halvings && !coarse; ++halvings) {
     if (std::all_of(pieces_.begin(), pieces_.end(), fits)) break;
     halve();
@@ -488,7 +489,7 @@ bool MarchRuleSolver::solve(const Job& job, PatchPoints& points) {
   bool fine = false;
   const auto solve_on = [&](const std::optional<FlatCells>& cells) {
     on_sigma_ = kOnSigma;
-    fine = lay_mesh(pressure, third, overlap, job.axis, cells, limits.error < kRough ? kMostHalvings : kRoughHalvings);
+    fine = lay_mesh(pressure, third, overlap, job.axis, cells, limits.error);
     on_sigma_ = std::max(std::clamp(1e-2 * limits.error, kOnSigmaAtBest, kOnSigma), 64.0 * kEpsilon * coordinates / cell_);
     return refine(pressure, third, limits, job.reference);
   };

@@ -181,10 +181,10 @@ class MarchRuleSolver {
     [[nodiscard]] bool bends(std::size_t i, std::size_t to, double sign) const;
   };
   [[nodiscard]] Shape shape_of(const Piece& piece) const;
-  [[nodiscard]] bool smooth(const Piece& piece) const;
+  [[nodiscard]] bool smooth(const Piece& piece, double error) const;
   [[nodiscard]] bool may_press(const PairPressure& pressure, const Piece& piece) const;
   bool lay_mesh(PairPressure& pressure, Thirds third, const Box& overlap, const std::optional<CommonAxis>& axis,
-                const std::optional<FlatCells>& flat, int most_halvings);
+                const std::optional<FlatCells>& flat, double error);
   void begin(PairPressure& pressure, Thirds third, std::vector<Piece>& pieces);
   static std::optional<double> turn(const Piece& piece, std::size_t across);
   void find_turns(PairPressure& pressure, Thirds third, std::span<const Piece> from, bool any);

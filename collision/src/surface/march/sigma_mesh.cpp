@@ -39,10 +39,23 @@ double outside_support(const PairPressure& pressure, int side) {
   return pressure.modulus(side) * field.value(box.upper + kFar * (box.extent() + Vec3::Constant(field.feature_size())));
 }
 
-void keep_unique(std::vector<Key>& keys) {
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+/// Adds the places that lie so far from those of a sorted list, which stays sorted: along an axis all move alike.
+/// @param room  for the result
+void add_moved(Key by, std::vector<Key>& keys, std::vector<Key>& room) {
+  room.clear();
+  std::size_t moved = 0;
+  for (const Key key : keys) {
+    for (; moved < keys.size() && keys[moved] + by <= key; ++moved) {
+      if (room.empty() || room.back() != keys[moved] + by) room.push_back(keys[moved] + by);
+    }
+    if (room.empty() || room.back() != key) room.push_back(key);
+  }
+  for (; moved < keys.size(); ++moved) {
+    if (room.back() != keys[moved] + by) room.push_back(keys[moved] + by);
+  }
+  keys.swap(room);
 }
+constexpr std::array<Key, 3> kAlongAxis{1, Key{1} << kBits, Key{1} << (2 * kBits)};  // to the next place along an axis
 
 /// Corner c of a cell: bit k of c is its side along axis k.
 std::array<int, 3> corner(std::size_t c) { return {static_cast<int>(c & 1), static_cast<int>(c >> 1 & 1), static_cast<int>(c >> 2)}; }
@@ -62,10 +75,6 @@ int turn(std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
 Vec3 SigmaMesher::place(Key key) const {
   const Place at = place_of(key);
   return origin_ + axes_ * (cell_ * Vec3(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])));
-}
-
-std::uint32_t SigmaMesher::node_of(Key key) const {
-  return static_cast<std::uint32_t>(std::lower_bound(nodes_.begin(), nodes_.end(), key) - nodes_.begin());
 }
 
 /// Cells in which both bodies may press equally, from larger blocks down, and their neighbours: what the images of triangles at
@@ -104,26 +113,18 @@ bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap) {
     }
     cells_.swap(near_);
   }
-  near_.clear();
-  for (const Key key : cells_) {
-    const Place at = place_of(key);
-    for (std::int64_t n = 0; n < 27; ++n) near_.push_back(key_of({at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1}));
+  std::sort(cells_.begin(), cells_.end());
+  for (const Key step : kAlongAxis) {  // and one to either side
+    for (Key& key : cells_) key -= step;
+    add_moved(step, cells_, near_);
+    add_moved(step, cells_, near_);
   }
-  cells_.swap(near_);
-  keep_unique(cells_);
   return cells_.size() <= kMostCells;
 }
 
 void SigmaMesher::find_nodes(PairPressure& pressure) {
-  nodes_.clear();
-  for (const Key key : cells_) {
-    const Place at = place_of(key);
-    for (std::size_t c = 0; c < 8; ++c) {
-      const auto k = corner(c);
-      nodes_.push_back(key_of({at[0] + k[0], at[1] + k[1], at[2] + k[2]}));
-    }
-  }
-  keep_unique(nodes_);
+  nodes_ = cells_;
+  for (const Key step : kAlongAxis) add_moved(step, nodes_, near_);
   node_.resize(nodes_.size());
   for (std::size_t i = 0; i < nodes_.size(); ++i) node_.point[i] = place(nodes_[i]);
   pressure.evaluate_values(node_);
@@ -133,16 +134,22 @@ void SigmaMesher::cut_cells(SigmaMesh& out) {
   // Six tetrahedra around the main diagonal of a cell: one for each order of the axes.
   constexpr std::array<std::array<std::size_t, 2>, 6> kPaths{{{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}}};
   cuts_.clear();  // three a triangle
+  std::array<std::uint32_t, 8> next{};  // nodes at the corners of the last cell: those of later ones come later
   for (const Key key : cells_) {
     const Place at = place_of(key);
     std::array<std::uint32_t, 8> node;
     std::array<bool, 8> above;
     for (std::size_t c = 0; c < 8; ++c) {
+      const auto k = corner(c);
+      const Key wanted = key_of({at[0] + k[0], at[1] + k[1], at[2] + k[2]});
+      while (nodes_[next[c]] != wanted) ++next[c];
+    }
+    for (std::size_t c = 0; c < 8; ++c) {
       auto k = corner(c);
       for (std::size_t i = 0; i < 2; ++i) {
         if (mirrored_ && at[i] < 0) k[i] = 1 - k[i];
       }
-      node[c] = node_of(key_of({at[0] + k[0], at[1] + k[1], at[2] + k[2]}));
+      node[c] = next[static_cast<std::size_t>(k[0] + 2 * k[1] + 4 * k[2])];
       above[c] = node_.a[node[c]] >= node_.b[node[c]];
     }
     if (std::equal(above.begin() + 1, above.end(), above.begin())) continue;

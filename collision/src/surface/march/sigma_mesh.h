@@ -45,7 +45,6 @@ class SigmaMesher {
   void cut_cells(SigmaMesh& out);
   void place_vertices(PairPressure& pressure, SigmaMesh& out);
   [[nodiscard]] Vec3 place(Key key) const;
-  [[nodiscard]] std::uint32_t node_of(Key key) const;
 
   struct Cut {
     std::uint32_t above, below;  // nodes: p_A >= p_B, p_A < p_B

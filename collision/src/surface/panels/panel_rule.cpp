@@ -617,6 +617,7 @@ bool PanelSolver::begin() {
     return true;
   }
   setting_.apex = job_.apex;
+  for (const int side : {0, 1}) setting_.longest[static_cast<std::size_t>(side)] = job_.pressure.field(side).surface_box().extent().norm();
   for (double margin = kMargin; margin <= kWidest; margin *= kWider) {
     r_.arena.clear();
     r_.panel.clear();

@@ -437,7 +437,8 @@ void Pass::make_pieces() {
   lift(s_.view, a_.cut_ray, s_.enough, a_.rays);
 }
 
-/// What flows out of a body's apex through a place of Sigma, of a pressure that falls evenly to where the body ends.
+/// What flows out of a body's apex through a place of Sigma, of a pressure that falls evenly to where the body ends; where it hardly falls, or rises first, of one that
+/// ends within the body's size.
 void Pass::add_flux(const Vec3& at, const SigmaRay& ray, double area, PatchSums& sums) const {
   for (const std::size_t side : {0u, 1u}) {
     const std::optional<Apex>& apex = s_.apex[side];
@@ -448,6 +449,8 @@ void Pass::add_flux(const Vec3& at, const SigmaRay& ray, double area, PatchSums&
     for (const std::size_t k : {0u, 1u}) {
       rate -= way.dot(s_.view.frame.axis[static_cast<std::size_t>(k == 0 ? first_across(ray.along) : second_across(ray.along))]) * (ray.slope[k] + fall * ray.rise[k]);
     }
+    const double slowest = ray.pressure / s_.longest[side];
+    rate = slowest + 0.5 * (rate + std::hypot(rate, slowest));
     if (!(rate > 0.0)) continue;
     const double length = ray.pressure / rate, wide = length / apex->distance(at);
     sums.flux[side] += area * sign * ray.normal.dot(way) * ray.pressure * length * (0.5 + wide * (1.0 / 3.0 + wide / 12.0));

@@ -67,6 +67,7 @@ struct PanelSetting {
   double enough = 0.0;    // of a step towards Sigma [m]
   double enough_rim = 0.0;  // of a step along a line over its length
   Vec3 reference = Vec3::Zero();
+  std::array<double, 2> longest{};  // of the columns of A, of B, at most [m]
 };
 
 /// Buffers of one thread, empty between calls but for their capacity; slices of panels point here.

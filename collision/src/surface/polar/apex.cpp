@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "numbers.h"
 #include "pairs/boxes.h"
@@ -15,17 +16,31 @@ namespace {
 
 constexpr std::size_t kLookedAt = 8;  // places that Sigma is far from to first order
 
-/// Distances along rays out of the apex to where the body ends; its pressure is positive at the apex and falls through 0 once on each.
-void find_ends(PairPressure& pressure, int side, const Vec3& apex, std::span<const Vec3> way, int steps, std::vector<double>& end) {
+/// Distances along rays out of the apex to where the body ends; its pressure is positive at the apex and falls through 0 once on each. Newton's method, held between
+/// places on both sides. @param enough  of a last step, over the size of the body: sums are off by its square
+void find_ends(PairPressure& pressure, int side, const Vec3& apex, std::span<const Vec3> way, double enough, std::vector<double>& end) {
   const double longest = pressure.field(side).surface_box().extent().norm();
-  std::vector<double> low(way.size(), 0.0), high(way.size(), longest), value(way.size());
-  std::vector<Vec3> point(way.size());
-  for (int step = 0; step < steps; ++step) {
-    for (std::size_t i = 0; i < way.size(); ++i) point[i] = apex + 0.5 * (low[i] + high[i]) * way[i];
-    pressure.evaluate(side, point, value);
-    for (std::size_t i = 0; i < way.size(); ++i) (value[i] > 0.0 ? low[i] : high[i]) = 0.5 * (low[i] + high[i]);
+  std::vector<double> low(way.size(), 0.0), high(way.size(), longest), value;
+  std::vector<Vec3> point, slope;
+  std::vector<std::size_t> open(way.size());
+  std::iota(open.begin(), open.end(), std::size_t{0});
+  end.assign(way.size(), 0.5 * longest);
+  for (int step = 0; step < kBracketSteps && !open.empty(); ++step) {
+    point.clear();
+    for (const std::size_t i : open) point.push_back(apex + end[i] * way[i]);
+    value.resize(open.size());
+    slope.resize(open.size());
+    pressure.evaluate(side, point, value, slope);
+    std::size_t left = 0;
+    for (std::size_t k = 0; k < open.size(); ++k) {
+      const std::size_t i = open[k];
+      (value[k] > 0.0 ? low[i] : high[i]) = end[i];
+      const double newton = end[i] - value[k] / slope[k].dot(way[i]), next = newton > low[i] && newton < high[i] ? newton : 0.5 * (low[i] + high[i]);
+      if (std::abs(next - end[i]) > enough * longest) open[left++] = i;
+      end[i] = next;
+    }
+    open.resize(left);
   }
-  end.assign(low.begin(), low.end());
 }
 
 /// The middle of what the body keeps or of what it loses, along the normal of Sigma, whichever is wider: the flux grows with the square of how near
@@ -74,7 +89,8 @@ struct Presses {
 
 /// The middle of a body, and places on the ways from there to where it ends: away from each of the others, and along all axes. None where that is not in it.
 std::vector<Vec3> places_in_body(PairPressure& pressure, int side, Thirds others) {
-  constexpr int kEnds = 8, kPlaces = 4;  // halvings; parts of a way
+  constexpr double kEnds = 0.01;  // of the size of the body
+  constexpr int kPlaces = 4;      // parts of a way
   const Box box = pressure.field(side).surface_box();
   const std::optional<implicit::CorePoint> core = pressure.field(side).core_point(box.centre());
   const Vec3 middle = core ? core->point : box.centre();
@@ -95,20 +111,22 @@ std::vector<Vec3> places_in_body(PairPressure& pressure, int side, Thirds others
 
 /// How far Sigma is from a place, as points on shells around it see it. @param lost  whether the place is   @param most  how far is looked [m]
 double free_around(PairPressure& pressure, int side, Thirds others, const Vec3& place, bool lost, double most) {
-  constexpr std::size_t kShells = 8, kAround = 26;  // to the faces, edges and corners of a cube
-  std::vector<Vec3> point;
-  for (std::size_t shell = 1; shell <= kShells; ++shell) {
-    for (const double x : {-1.0, 0.0, 1.0}) {
-      for (const double y : {-1.0, 0.0, 1.0}) {
-        for (const double z : {-1.0, 0.0, 1.0}) {
-          if (x != 0.0 || y != 0.0 || z != 0.0) point.push_back(place + (most * static_cast<double>(shell) / kShells) * Vec3(x, y, z).normalized());
-        }
+  constexpr int kShells = 8;
+  std::vector<Vec3> way;  // to the faces, edges and corners of a cube
+  for (const double x : {-1.0, 0.0, 1.0}) {
+    for (const double y : {-1.0, 0.0, 1.0}) {
+      for (const double z : {-1.0, 0.0, 1.0}) {
+        if (x != 0.0 || y != 0.0 || z != 0.0) way.push_back(Vec3(x, y, z).normalized());
       }
     }
   }
-  const Presses there(pressure, side, others, point);
-  for (std::size_t i = 0; i < point.size(); ++i) {
-    if (there.own[i] > 0.0 && there.lost(i) != lost) return most * static_cast<double>(i / kAround) / kShells;
+  std::vector<Vec3> point(way.size());
+  for (int shell = 1; shell <= kShells; ++shell) {
+    for (std::size_t i = 0; i < way.size(); ++i) point[i] = place + (most * shell / kShells) * way[i];
+    const Presses there(pressure, side, others, point);
+    for (std::size_t i = 0; i < point.size(); ++i) {
+      if (there.own[i] > 0.0 && there.lost(i) != lost) return most * (shell - 1) / kShells;
+    }
   }
   return most;
 }
@@ -153,8 +171,16 @@ std::optional<Apex> find_shared_apex(PairPressure& pressure, int side, Thirds ot
   }
   std::stable_sort(free.begin(), free.end(), wider);
   free.resize(kLookedAt);  // places_in_body gives more
-  for (Free& f : free) f.clear = free_around(pressure, side, others, place[f.place], there.lost(f.place), f.clear);
-  std::stable_sort(free.begin(), free.end(), wider);
+  // None is seen farther from Sigma than it is to first order.
+  const std::size_t ranked = static_cast<std::size_t>(rank) + 1;
+  for (std::size_t k = 0; k < free.size(); ++k) {
+    if (k >= ranked && free[k].clear <= free[ranked - 1].clear) {
+      free.resize(k);
+      break;
+    }
+    free[k].clear = free_around(pressure, side, others, place[free[k].place], there.lost(free[k].place), free[k].clear);
+    std::inplace_merge(free.begin(), free.begin() + static_cast<std::ptrdiff_t>(k), free.begin() + static_cast<std::ptrdiff_t>(k) + 1, wider);
+  }
   const std::size_t best = free[static_cast<std::size_t>(rank)].place;
   taker = there.by[best];
   return Apex{.at = place[best], .lost = there.lost(best)};
@@ -162,6 +188,7 @@ std::optional<Apex> find_shared_apex(PairPressure& pressure, int side, Thirds ot
 
 void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error, std::vector<Vec3>& point, std::vector<double>& volume) {
   constexpr int kFewest = 8, kInPanel = 16, kMost = 64, kAlong = 8;
+  constexpr double kEnough = 1e-6;  // of the size of the body
   const std::size_t begin = point.size();
   std::vector<Vec3> way;
   std::vector<double> share, end, value;
@@ -182,7 +209,7 @@ void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error,
         }
       }
     }
-    find_ends(pressure, side, apex, way, kBracketSteps, end);
+    find_ends(pressure, side, apex, way, kEnough, end);
     point.resize(begin);
     volume.resize(begin);
     for (std::size_t i = 0; i < way.size(); ++i) {

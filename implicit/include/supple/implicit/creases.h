@@ -23,7 +23,8 @@ namespace supple::implicit {
 /// Where triangles would intersect then, as where cells bridge a valley with an opening below about 16 degrees several cells above its ground, or
 /// where creases meet, these changes are undone step by step, in the limit down to the triangles of march_cubes: closed, oriented, and without
 /// intersections beyond rounding. The cells whose crease stays cut off for this reason are counted. A vertex on a crease has the mean of the
-/// normals of its sides. With options.error, cells get smaller by sqrt(2) until it is met, starting from the first cells of march_cubes.
+/// normals of its sides. With options.error, cells get smaller by sqrt(2) until it is met, starting from the first cells of march_cubes, or until dividing those triangles that
+/// are too far from the surface takes fewer, new vertices of creases on these.
 /// @pre the rule of the field's blend is Graph, options.refinements is 0   @throws Error{Limit} as CubeMesher::make
 [[nodiscard]] Mesh march_creases(const Field& field, const MarchOptions& options, const Executor& executor,
                                  MarchCounts* counts = nullptr);

@@ -33,8 +33,7 @@ class Sharpener {
         memory_(memory), crossings_(crossings), mesh_(mesh),
         steps_(std::move(mesh.triangle)), safe_(steps_.triangles().size(), true) {}
 
-  /// @return cells that keep a crease cut off
-  std::uint64_t run() {
+  Sharpened run() {
     add_points();
     turn_edges();
     cut_edges();
@@ -46,8 +45,7 @@ class Sharpener {
     mesh_.triangle.clear();
     for (const std::uint32_t t : steps_.numbers()) mesh_.triangle.push_back(steps_[t]);
     const std::uint64_t blunt = cut_off(back);
-    leave_out_unused();
-    return blunt;
+    return {blunt, leave_out_unused()};
   }
 
  private:
@@ -347,15 +345,16 @@ class Sharpener {
     return static_cast<std::uint64_t>(std::unique(cells.begin(), cells.end()) - cells.begin());
   }
 
-  /// Vertices that no triangle has; all others keep their order.
-  void leave_out_unused() {
+  /// Vertices that no triangle has; all others keep their order. @return how many are left on creases
+  std::size_t leave_out_unused() {
     constexpr std::uint32_t kUnused = ~std::uint32_t{0};
     std::vector<std::uint32_t> number(mesh_.vertex_count(), kUnused);
     for (const Triangle& t : mesh_.triangle) {
       for (const std::uint32_t v : t) number[v] = 0;
     }
-    std::uint32_t count = 0;
+    std::uint32_t count = 0, on_sides = 0;
     for (std::size_t v = 0; v < number.size(); ++v) {
+      if (v == owner_.size()) on_sides = count;
       if (number[v] == kUnused) continue;
       mesh_.position[count] = mesh_.position[v];
       mesh_.normal[count] = mesh_.normal[v];
@@ -366,6 +365,7 @@ class Sharpener {
     for (Triangle& t : mesh_.triangle) {
       for (std::uint32_t& v : t) v = number[v];
     }
+    return owner_.size() < number.size() ? count - on_sides : 0;
   }
 
   static constexpr double kBeyond = 1.0, kFarthest = 2.0;  // [cells]
@@ -386,8 +386,7 @@ class Sharpener {
 
 }  // namespace
 
-std::uint64_t sharpen(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings,
-                      Mesh& mesh) {
+Sharpened sharpen(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings, Mesh& mesh) {
   return Sharpener(field, changes, memory, crossings, mesh).run();
 }
 

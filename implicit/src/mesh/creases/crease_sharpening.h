@@ -22,12 +22,16 @@ struct CreasedField {
   bool skip = true;                      ///< as MarchOptions::skip
 };
 
+struct Sharpened {
+  std::uint64_t blunt_cells = 0;  ///< that keep a crease cut off
+  std::size_t on_creases = 0;     ///< vertices, the last ones of the mesh
+};
+
 /// Puts a vertex onto the crease in every cell whose vertices belong to several nodes, turns edges that cross the crease, and cuts those
 /// that still do (Kobbelt et al. 2001, "Feature sensitive surface extraction from volume data"; the crease itself is met here). What
 /// crosses then is taken back.
 /// @param changes  since the memory was last used
-/// @return cells that keep a crease cut off
-std::uint64_t sharpen(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings,
+Sharpened sharpen(const CreasedField& field, const march::ViewMemory& changes, CreaseMemory& memory, CrossingMemory& crossings,
                       Mesh& mesh);
 
 }  // namespace supple::implicit

@@ -48,6 +48,7 @@ class CreaseMarcher {
   void march_anew(const Executor& executor);
 
   [[nodiscard]] const MarchCounts& counts() const { return counts_; }
+  [[nodiscard]] std::size_t on_creases() const { return sharpened_.on_creases; }
   [[nodiscard]] bool whole() const { return marcher_.whole(); }
   [[nodiscard]] MarchCounts most_counts() const { return marcher_.most_counts(counts_); }
   /// Of all that is kept, the mesh too.
@@ -76,7 +77,7 @@ class CreaseMarcher {
   CrossingMemory crossings_;
   Mesh mesh_, last_mesh_;
   TriangleErrors errors_;             ///< of last_mesh_, or mesh_ once they are requested
-  std::uint64_t blunt_cells_ = 0;     ///< of mesh_
+  Sharpened sharpened_;               ///< of mesh_
   double error_ = 0.0;                ///< the largest of them [m]
   double feature_ = 0.0;              ///< of the field when they were [m]
   bool measured_ = false;             ///< errors_ are those of mesh_
@@ -90,7 +91,7 @@ void CreaseMarcher::march_anew(const Executor& executor) {
 }
 
 void CreaseMarcher::count_kept() {
-  counts_.blunt_cells = blunt_cells_;
+  counts_.blunt_cells = sharpened_.blunt_cells;
   counts_.bytes += memory_.bytes() + crossings_.bytes() + bytes_of(owner_) + bytes_of(marcher_.mesh);
 }
 
@@ -122,7 +123,7 @@ const Mesh& CreaseMarcher::make(const Field& field, const Lattice& lattice, bool
   memory_.begin_call(others || changes.all);
   if (comparable_) std::swap(mesh_, last_mesh_);
   mesh_ = marcher_.mesh;
-  blunt_cells_ = sharpen({field, views, lattice, owner_, skip}, changes, memory_, crossings_, mesh_);
+  sharpened_ = sharpen({field, views, lattice, owner_, skip}, changes, memory_, crossings_, mesh_);
   memory_.end_call();
   node_ = std::move(present);
   made_ = true;
@@ -179,8 +180,9 @@ struct CreaseMesher::Impl {
     return on.make(field, {.origin = options.lattice.origin, .cell = plan.cell}, options.skip, executor);
   }
   static double error_on(CreaseMarcher& on, const march::LevelPlan& /*plan*/, const Executor& executor) { return on.error(executor); }
-  /// Divided triangles would not end on the creases.
-  static const Mesh* divide(const FieldView&, const Mesh&, double, std::size_t, const Executor&) { return nullptr; }
+  const Mesh* divide(const CreaseMarcher& on, const FieldView& field, const Mesh& mesh, double error, std::size_t most, const Executor& executor) {
+    return division.divide(field, mesh, error, most, executor, on.on_creases());
+  }
   static Mesh take_mesh(CreaseMarcher& on, const march::LevelPlan& /*plan*/) { return on.take_mesh(); }
   static std::uint64_t bytes_beside() { return 0; }
   static void forget_beside() {}

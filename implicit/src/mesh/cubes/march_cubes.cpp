@@ -77,7 +77,7 @@ struct CubeMesher::Impl {
     return on.mesh(plan.refinements, options.may_cross, executor, scratch);
   }
   static double error_on(march::RefinedMarcher& on, const march::LevelPlan& plan, const Executor& executor) { return on.error(plan.refinements, executor); }
-  const Mesh* divide(const FieldView& field, const Mesh& mesh, double error, std::size_t most, const Executor& executor) {
+  const Mesh* divide(const march::RefinedMarcher& /*on*/, const FieldView& field, const Mesh& mesh, double error, std::size_t most, const Executor& executor) {
     return division.divide(field, mesh, error, most, executor);
   }
   static Mesh take_mesh(march::RefinedMarcher& on, const march::LevelPlan& plan) { return on.take_mesh(plan.refinements); }

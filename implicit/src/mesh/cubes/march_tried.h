@@ -159,7 +159,7 @@ const Mesh* make_to_error(Of& of, const AnyField& field, const MarchOptions& opt
     size.add(level, *mesh);
     of.tried.fit(plan.cell, of.bytes_beside());
     // The next level has twice as many triangles: where fewer do by dividing those that are too far from the surface, the cells stay.
-    divided = error > options.error ? of.divide(field, *mesh, options.error, 2 * mesh->triangle_count(), executor) : nullptr;
+    divided = error > options.error ? of.divide(on, field, *mesh, options.error, 2 * mesh->triangle_count(), executor) : nullptr;
     if (divided != nullptr) {
       count.error = of.division.error();
       return LevelTry{.error = count.error};

@@ -9,7 +9,7 @@ namespace {
 
 std::atomic<void*> spare{nullptr};
 std::atomic<bool> in_use{false};
-std::atomic<std::new_handler> before{nullptr};
+std::atomic<std::new_handler> earlier_handler{nullptr};
 
 /// As the standard asks of a handler: makes room, or throws.
 void give_spare() {
@@ -17,7 +17,7 @@ void give_spare() {
     std::free(memory);
     return;
   }
-  const std::new_handler next = before.load();
+  const std::new_handler next = earlier_handler.load();
   if (next == nullptr) throw std::bad_alloc();
   next();
 }
@@ -33,12 +33,12 @@ SpareMemory::SpareMemory(std::size_t bytes) {
   }
   counts_ = true;
   spare = memory;
-  before = std::set_new_handler(give_spare);
+  earlier_handler = std::set_new_handler(give_spare);
 }
 
 SpareMemory::~SpareMemory() {
   if (!counts_) return;
-  std::set_new_handler(before.load());
+  std::set_new_handler(earlier_handler.load());
   std::free(spare.exchange(nullptr));
   in_use = false;
 }

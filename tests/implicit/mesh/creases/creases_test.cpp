@@ -10,6 +10,7 @@
 #include "implicit/mesh_checks.h"
 #include "mesh/creases/crease_crossings.h"
 #include "mesh/creases/crease_nodes.h"
+#include "mesh/error_search.h"
 #include "supple/core/error.h"
 #include "supple/implicit/march_cubes.h"
 #include "support/mesh_distance.h"
@@ -435,6 +436,30 @@ TEST(Creases, ReachTheErrorThatIsAskedFor) {
   // A stated cell is the coarsest.
   const Mesh stated = march_creases(body.field, {.lattice = lattice_of(0.03), .error = 0.1}, Executor(1));
   EXPECT_EQ(hash_of(stated), hash_of(march_creases(body.field, {.lattice = lattice_of(0.03)}, Executor(1))));
+}
+
+// Two small balls in a large one, which meets the error with the triangles that it has: the small ones alone are divided, and the creases around them.
+TEST(Creases, LetTheCellsOfALargeBodyWithSmallFeaturesStayLarge) {
+  constexpr double kError = 1e-3;
+  Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}, {wyvill_point(0.16), Vec3(0.46, 0.0, 0.02)}, {wyvill_point(0.12), Vec3(-0.3, 0.36, 0.0)}});
+  body.skeleton.blend.rule = BlendRule::Graph;
+  body.place();
+  MarchCounts counts;
+  const Mesh mesh = march_creases(body.field, {.lattice = {}, .error = kError}, Executor(2), &counts);
+  const MeshReport report = expect_closed(mesh);
+  EXPECT_LE(centroid_error(body.field, mesh, Executor(2)), kError);
+  EXPECT_LE(counts.error, kError);
+  EXPECT_EQ(self_intersections(mesh, 0.03), 0u);
+  double cell = first_cell(body.field, 0.0);
+  const auto even_on = [&] { return march_creases(body.field, {.lattice = {.origin = Vec3::Zero(), .cell = cell}}, Executor(2)); };
+  Mesh even = even_on();
+  for (; centroid_error(body.field, even, Executor(2)) > kError; even = even_on()) cell *= 0.5 * std::numbers::sqrt2;
+  EXPECT_LT(3 * mesh.triangle_count(), even.triangle_count());
+  EXPECT_NEAR(report.volume, inspect(even).volume, kError * report.area);
+  std::vector<double> value(mesh.vertex_count());
+  body.field.evaluate(mesh.position, value);
+  for (const double f : value) ASSERT_NEAR(f, 0.0, 1e-9);
+  EXPECT_EQ(hash_of(march_creases(body.field, {.lattice = {}, .error = kError}, Executor(5))), hash_of(mesh));
 }
 
 TEST(Creases, AreTheSurfaceOfOtherMeshersForAnyGraph) {
