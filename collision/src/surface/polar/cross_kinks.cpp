@@ -320,8 +320,30 @@ double PolarRuleSolver::side_on_ray(PairPressure& pressure, const RaySheet& on, 
   return on.value + share * (on.along + on.square * share + on.mixed * rise) + rise * (on.up + on.up_square * rise);
 }
 
+/// How much harder than the pair third bodies press at the samples of all rays, to first order, in `third_value_`: one body after the other.
+void PolarRuleSolver::sample_thirds(PairPressure& pressure) {
+  PressureBatch& batch = crossing_batch_;
+  batch.point.clear();
+  for (std::size_t i = 0; i < rays_.size(); ++i) {
+    const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
+    for (int j = 0; j <= kSamples; ++j) {
+      const double share = static_cast<double>(j) / kSamples;
+      batch.point.push_back(frame_.origin + share * reach + model_height(i, share) * frame_.axis);
+    }
+  }
+  batch.resize(batch.point.size());
+  pressure.evaluate_values(batch);
+  evaluate_thirds(batch.point);
+  const double of_a = frame_.depth[0] / frame_.thickness;
+  for (std::size_t k = 0; k < third_value_.size(); ++k) {
+    const std::size_t i = k % batch.size();
+    third_value_[k] -= of_a * batch.a[i] + (1.0 - of_a) * batch.b[i];
+  }
+}
+
 /// Where the rays cross kinks, on the heights as the curvature at the peak and the rim give them.
 void PolarRuleSolver::guess_crossings(PairPressure& pressure) {
+  if (cut_) sample_thirds(pressure);
   crossings_.clear();
   sheets_.clear();
   for (const std::size_t k : crossing_) sheets_.push_back(k < kinks_.size() ? sheet_of(kinks_[k]) : Sheet{});
@@ -331,8 +353,10 @@ void PolarRuleSolver::guess_crossings(PairPressure& pressure) {
     for (int j = 0; j <= kSamples; ++j) height[static_cast<std::size_t>(j)] = model_height(i, static_cast<double>(j) / kSamples);
     for (std::size_t c = 0; c < crossing_.size(); ++c) {
       const RaySheet on = sheet_along(i, c, reach);
-      for (std::size_t j = 0; j < s.size(); ++j) s[j] = side_on_ray(pressure, on, static_cast<double>(j) / kSamples, height[j]);
-      if (on.kink >= kinks_.size() && cross_imprints(pressure, i, on.kink, s)) continue;
+      const bool field = on.kink < kinks_.size();
+      const std::size_t first = field ? 0 : ((on.kink - kinks_.size()) * rays_.size() + i) * s.size();
+      for (std::size_t j = 0; j < s.size(); ++j) s[j] = field ? side_on_ray(pressure, on, static_cast<double>(j) / kSamples, height[j]) : third_value_[first + j];
+      if (!field && cross_imprints(pressure, i, on.kink, s)) continue;
       const std::size_t others = crossings_.size();
       for (std::size_t j = 0; j < kSamples; ++j) {
         const double left = static_cast<double>(j) / kSamples, right = static_cast<double>(j + 1) / kSamples;

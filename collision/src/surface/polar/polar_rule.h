@@ -173,6 +173,7 @@ class PolarRuleSolver {
   [[nodiscard]] RaySheet sheet_along(std::size_t ray, std::size_t c, const Vec3& reach) const;
   double side_on_ray(PairPressure& pressure, const RaySheet& on, double share, double rise);
   void cross_between(PairPressure& pressure, const RaySheet& on, Interval where, Interval sides, std::size_t others);
+  void sample_thirds(PairPressure& pressure);
   void guess_crossings(PairPressure& pressure);
   void find_crossings(PairPressure& pressure, double error);
   bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
