@@ -22,6 +22,8 @@ constexpr double kRough = 1e-2;  // error from which on fewer Gauss points along
 constexpr int kAlong = 8, kAlongRough = 4;  // these points
 constexpr double kFine = 1e-4;  // error below which there may be more cells, and pieces are half as long
 constexpr std::size_t kMostLeaves = 4096, kMostFineLeaves = 16384;
+constexpr double kMostParts = 64.0;  // of a piece of a column: overlaps may be 1e12 times as long as the smallest feature
+constexpr std::size_t kMostPoints = std::size_t{1} << 22;  // after which cells are halved no more
 constexpr double kEndsOfError = 1e-3;   // the same of the ends of columns, off by the square of what the last two values lie apart
 
 }  // namespace
@@ -175,7 +177,7 @@ void SqueezedRegion::measure_block(const Lost& lost, std::span<Cell> cells) {
 
 void SqueezedRegion::add_piece(std::size_t column, double low, double high) {
   const GaussRule& along = gauss_rule(along_piece_);
-  const double parts = std::max(std::ceil((high - low) / longest_piece_), 1.0), length = (high - low) / parts;
+  const double parts = std::clamp(std::ceil((high - low) / longest_piece_), 1.0, kMostParts), length = (high - low) / parts;
   for (double k = 0.0; k < parts; ++k) {
     for (std::size_t j = 0; j < along.node.size(); ++j) {
       point_.push_back(from_[column] + (low + (k + along.node[j]) * length) * along_);
@@ -252,7 +254,7 @@ void SqueezedRegion::fill(const Lost& lost, const Box& overlap, const Vec3& acro
   }
   measure(lost, split_);
   const std::size_t most_leaves = lost.error < kFine ? kMostFineLeaves : kMostLeaves;
-  for (quarter(lost); leaf_.size() < most_leaves && choose(lost.error);) quarter(lost);
+  for (quarter(lost); leaf_.size() < most_leaves && point_.size() < kMostPoints && choose(lost.error);) quarter(lost);
   const std::size_t begin = points.volume_point.size();
   const auto append = [](auto& to, const auto& from, const Cell& cell) {
     to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(cell.begin), from.begin() + static_cast<std::ptrdiff_t>(cell.end));
