@@ -15,8 +15,7 @@ struct Smoothness {
   double flat;  // in cells: highest middle of an edge
   double turn;  // least cosine between normals of a triangle
 };
-constexpr Smoothness kSmooth{0.2, 0.5}, kSmoothEnough{0.35, 0.25};  // the latter at coarse errors, which it meets with room to spare
-constexpr double kCoarse = 5e-4;       // error from which on it is enough
+constexpr Smoothness kSmooth{0.2, 0.5}, kSmoothEnough{0.35, 0.25};  // the latter at coarse errors
 constexpr double kMargin = 2.0;        // of a cubic polynomial, in what it misses at the middles of edges
 constexpr double kDoubt = 1.0 / 64.0;  // share of the error asked for that a single doubtful piece may be
 constexpr int kMostLevels = 24;        // of splitting doubtful pieces at once
@@ -279,7 +278,7 @@ bool MarchRuleSolver::may_press(const PairPressure& pressure, const Piece& piece
 
 /// Whether the image of a triangle of the mesh bends so little that Newton's method finds all of it.
 bool MarchRuleSolver::smooth(const Piece& piece, double error) const {
-  const Smoothness& least = error >= kCoarse ? kSmoothEnough : kSmooth;
+  const Smoothness& least = error >= kCoarseError ? kSmoothEnough : kSmooth;
   const auto& c = mesh_.triangle[piece.triangle].corner;
   for (std::size_t k = 0; k < 3; ++k) {
     if (!piece.corner[k].good || !piece.middle[k].good || std::abs(piece.middle[k].height) > least.flat * cell_) return false;

@@ -30,7 +30,7 @@ constexpr int kFewNodes = 3;           // through a squeezed region
 constexpr double kWidest = 20.0;       // ends of columns, over where they begin
 constexpr std::size_t kBatch = 256;    // pieces that are integrated at once
 
-int order_for(double error) { return error >= 5e-4 ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
+int order_for(double error) { return error >= kCoarseError ? 3 : error >= 5e-5 ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 6 : 8; }
 
 }  // namespace
 

@@ -18,6 +18,9 @@
 
 namespace supple::collision {
 
+/// Error from which on coarser meshes and rules are enough: they meet it with room to spare.
+inline constexpr double kCoarseError = 5e-4;
+
 class MarchRuleSolver {
  public:
   struct Limits {

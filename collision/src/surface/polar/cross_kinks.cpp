@@ -333,11 +333,13 @@ void PolarRuleSolver::sample_thirds(PairPressure& pressure) {
   }
   batch.resize(batch.point.size());
   pressure.evaluate_values(batch);
-  evaluate_thirds(batch.point);
   const double of_a = frame_.depth[0] / frame_.thickness;
-  for (std::size_t k = 0; k < third_value_.size(); ++k) {
-    const std::size_t i = k % batch.size();
-    third_value_[k] -= of_a * batch.a[i] + (1.0 - of_a) * batch.b[i];
+  const std::size_t n = batch.size();
+  third_value_.resize(third_.size() * n);
+  for (std::size_t t = 0; t < third_.size(); ++t) {
+    const auto value = std::span(third_value_).subspan(t * n, n);
+    third_[t]->field.evaluate(batch.point, value);
+    for (std::size_t i = 0; i < n; ++i) value[i] = third_[t]->material.modulus * value[i] - (of_a * batch.a[i] + (1.0 - of_a) * batch.b[i]);
   }
 }
 

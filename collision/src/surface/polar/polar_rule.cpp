@@ -28,7 +28,7 @@ constexpr int kHeightSteps = 14;
 /// What tells whether a rule is enough where no kink is near: the forces of two may agree by chance, as their errors change sign with depth; then the spread of
 /// the pressure, which converges later, does not.
 double error_where_smooth(const PatchSums& fine, const PatchSums& coarse) {
-  constexpr double kLater = 0.04;
+  constexpr double kLater = 0.04;  // of what spreads differ by: about so much less forces do
   return error_of_finer(std::max(relative_difference(fine, coarse), kLater * std::abs(fine.spread - coarse.spread) / fine.spread));
 }
 
