@@ -11,6 +11,7 @@ import time
 from support import Outcome, run_process
 
 LONG_S = 3600
+FUZZ_S = 4 * LONG_S  # libFuzzer ends after so long, with the inputs tried until then
 
 
 def of_tests(program, pattern, context, asked):
@@ -231,7 +232,7 @@ BUILDING = threading.Lock()
 
 
 def sanitized_fuzz(target, context, asked):
-    """A fuzz target by libFuzzer, for so many inputs, but at most an hour; what it finds is left in its folder."""
+    """A fuzz target by libFuzzer, for so many inputs, but at most FUZZ_S seconds; what it finds is left in its folder."""
     outcome = Outcome()
     with BUILDING:
         # A configured folder keeps its options.
@@ -243,8 +244,8 @@ def sanitized_fuzz(target, context, asked):
     folder = context.folder("libfuzzer_" + target)
     (folder / "found").mkdir()
     corpora = [context.sources / "tests/fuzz/corpus" / target, *([context.sources / SCENES] if target in ("scene", "check") else [])]
-    ended = run_process([context.sources / "build/sanitizers/bin" / ("fuzz_" + target), f"-runs={asked}", f"-max_total_time={LONG_S}", f"-seed={context.seed}", "found", *corpora],
-                        timeout=2 * LONG_S, cwd=folder)
+    ended = run_process([context.sources / "build/sanitizers/bin" / ("fuzz_" + target), f"-runs={asked}", f"-max_total_time={FUZZ_S}", f"-seed={context.seed}", "found", *corpora],
+                        timeout=2 * FUZZ_S, cwd=folder)
     tried = re.search(r"^stat::number_of_executed_units: (\d+)", ended.err, re.MULTILINE)
     outcome.reached = int(tried.group(1)) if tried else 0
     kept = len(list((folder / "found").iterdir()))
