@@ -296,13 +296,12 @@ void react_pair(const ReactionInputs& in, const ContactCount& contacts, const Pa
       const Vec3& normal = on.normal[i];
       const Vec3 v = slip.at(i, x);
       const double approach = v.dot(normal);
-      const Vec3 slide = v - approach * normal;
-      const double speed = slide.norm();
       const double factor = std::max(0.0, 1.0 + material.dissipation * approach);
       Vec3 f = -on.load[i] * (factor - 1.0) * normal;
-      if (speed > 0.0 && rubs) {
-        const double grip = friction_mollifier(speed, slow) / speed;
-        f -= (material.friction * on.load[i] * factor * grip) * slide;
+      if (rubs) {
+        const Vec3 slide = v - approach * normal;
+        const double speed = slide.norm();
+        if (speed > 0.0) f -= (material.friction * on.load[i] * factor * (friction_mollifier(speed, slow) / speed)) * slide;
       }
       if (!sides[0].single()) sides[0].add_by_contribution(i, x, f);
       if (!sides[1].single()) sides[1].add_by_contribution(i, x, -f);

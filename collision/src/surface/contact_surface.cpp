@@ -84,7 +84,9 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   thread_local std::vector<Extent> begins;  // of blocks
   thread_local Partners partners;
   thread_local std::vector<Box> boxes;
+  thread_local std::vector<SharedApex> shared_apex;
   boxes.resize(bodies.size());
+  shared_apex.resize(settings.energy ? bodies.size() : 0);
   partners.build(bodies.size(), candidates.pair);
   // In portions, so that what pairs leave behind is joined while it is still near, and buffers stay small.
   constexpr std::size_t kMostKept = std::size_t{32} << 20;
@@ -94,6 +96,7 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
   struct Job {
     ContactQuery query;
     std::span<Box> boxes;
+    std::span<SharedApex> shared_apex;
     std::vector<PairResult>& results;
     std::vector<Extent>& begins;
     ContactSurface& out;
@@ -102,17 +105,23 @@ void solve_contact_surface(std::span<const ContactBody> bodies, const ContactCan
       const BodyPair& pair = query.candidates.pair[first + k];
       return {query.bodies[pair.a].pose.size() > 1, query.bodies[pair.b].pose.size() > 1};
     }
-  } job{{bodies, candidates, partners, boxes, settings}, boxes, results, begins, out, 0};
+  } job{{bodies, candidates, partners, boxes, shared_apex, settings}, boxes, shared_apex, results, begins, out, 0};
   constexpr std::size_t kBodies = 64;
   executor.for_blocks(bodies.size(), kBodies, [&job](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) job.boxes[i] = job.query.bodies[i].field ? job.query.bodies[i].field.surface_box() : Box{};
   });
+  if (settings.energy) {
+    constexpr std::size_t kApexes = 4;
+    executor.for_blocks(bodies.size(), kApexes, [&job](std::size_t begin, std::size_t end) {
+      thread_local PairSolver solver;
+      for (std::size_t i = begin; i < end; ++i) job.shared_apex[i] = solver.find_apex(job.query, static_cast<std::uint32_t>(i));
+    });
+  }
   Extent size;
   for (; job.first < pairs; job.first += kPortion) {
     const std::size_t count = std::min(kPortion, pairs - job.first);
     executor.for_blocks(count, kPairsTogether, [&job](std::size_t begin, std::size_t end) {
       thread_local PairSolver solver;
-      solver.forget();
       Extent block;
       for (std::size_t k = begin; k < end; ++k) {
         solver.solve(job.query, job.first + k, job.results[k]);

@@ -584,33 +584,49 @@ void PairSolver::fill_within(const Job& job, bool equal, std::optional<int> soft
   }
 }
 
-/// One search for all pairs of a body, but where it is met with others as one.
-PairSolver::SharedApex PairSolver::shared_apex(const Job& job, std::size_t side, std::span<const std::uint32_t> partners) {
-  const std::uint32_t body = side == 0 ? job.pair.a : job.pair.b;
-  const bool alone = &(side == 0 ? job.a : job.b) == &job.bodies[body];
-  const auto known = std::find_if(shared_apex_.begin(), shared_apex_.end(), [body](const SharedApex& shared) { return shared.body == body; });
-  if (alone && known != shared_apex_.end()) return *known;
+SharedApex PairSolver::search_apex(PairPressure& pressure, std::size_t side, const ContactQuery& query, std::uint32_t body) {
   others_.clear();
-  for (const std::uint32_t c : partners) others_.push_back(&job.bodies[c]);
-  SharedApex shared{.body = body, .apex = {}, .taker = 0};
-  shared.apex = find_shared_apex(job.polar.pressure, static_cast<int>(side), others_, job.settings().other_columns ? ApexRank::Next : ApexRank::Best, shared.taker);
-  if (alone) shared_apex_.push_back(shared);
+  for (const std::uint32_t c : query.partners.of(body)) others_.push_back(&query.bodies[c]);
+  SharedApex shared;
+  shared.searched = true;
+  shared.apex = find_shared_apex(pressure, static_cast<int>(side), others_, query.settings.other_columns ? ApexRank::Next : ApexRank::Best, shared.taker);
   return shared;
+}
+
+SharedApex PairSolver::find_apex(const ContactQuery& query, std::uint32_t body) {
+  const ContactBody& own = query.bodies[body];
+  const std::span<const std::uint32_t> partners = query.partners.of(body);
+  if (partners.size() < 2 || own.pose.size() > 1 || !own.field.convex()) return {};
+  const std::vector<BodyPair>& pairs = query.candidates.pair;
+  for (const std::uint32_t c : partners) {
+    const BodyPair pair{std::min(body, c), std::max(body, c)};
+    const auto k = static_cast<std::size_t>(std::lower_bound(pairs.begin(), pairs.end(), pair) - pairs.begin());
+    const auto presses = [&](std::uint32_t d) { return d != body && d != c && overlap_at_once(query.boxes[d], query.candidates.overlap[k]); };
+    const std::span<const std::uint32_t> others = query.partners.of(c);
+    if (std::none_of(partners.begin(), partners.end(), presses) && std::none_of(others.begin(), others.end(), presses)) continue;
+    PairPressure pressure(own, query.bodies[c]);
+    SharedApex shared = search_apex(pressure, 0, query, body);
+    shared.pair = k;
+    shared.evaluations = pressure.evaluations();
+    return shared;
+  }
+  return {};
 }
 
 /// What a convex body loses to several others flows out of one place of it through Sigma of all its pairs: such sides need no region. Obstacles lose to
 /// each other what they do not press hardest on, which no Sigma bounds.
-void PairSolver::find_apexes(Job& job, const Partners& partners) {
+void PairSolver::find_apexes(Job& job, const ContactQuery& query) {
   if (third_.empty()) return;
   for (const std::size_t side : {0u, 1u}) {
     if (job.polar.regions[side] != Region::Sums) continue;
     const std::uint32_t body = side == 0 ? job.pair.a : job.pair.b, other = job.pair.a + job.pair.b - body;
     const auto fixed = [&job](std::uint32_t c) { return job.bodies[c].fixed; };
     if (fixed(body) && std::any_of(third_.begin(), third_.end(), fixed)) continue;
-    const SharedApex shared = shared_apex(job, side, partners.of(body));
+    const bool alone = &(side == 0 ? job.a : job.b) == &job.bodies[body];  // not met with others as one
+    const SharedApex shared = alone && query.shared_apex[body].searched ? query.shared_apex[body] : search_apex(job.polar.pressure, side, query, body);
     apex_[side] = shared.apex;
     if (!apex_[side]) continue;
-    const std::uint32_t by = partners.of(body)[shared.taker];
+    const std::uint32_t by = query.partners.of(body)[shared.taker];
     apex_[side]->lost = apex_[side]->lost && (by == other || (team_ != nullptr && fixed(other) && std::binary_search(team_->member.begin(), team_->member.end(), by)));
     job.polar.regions[side] = Region::None;
   }
@@ -636,7 +652,7 @@ void PairSolver::find_patches(const Job& job) {
 }
 
 void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out) {
-  const auto& [bodies, candidates, partners, boxes, settings] = query;
+  const auto& [bodies, candidates, partners, boxes, shared_apex, settings] = query;
   const BodyPair pair = candidates.pair[k];
   out.summary.bodies = pair;
   out.clear();
@@ -668,7 +684,7 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
   const bool equal = coincide(a, b);
   const std::optional<int> softer = equal ? std::nullopt : softer_of_nested_balls(a, b);
   apex_ = {};
-  if (!equal) find_apexes(job, partners);
+  if (!equal) find_apexes(job, query);
   if (!equal && !softer) {
     find_patches(job);
     choose(job, out);
@@ -688,6 +704,9 @@ void PairSolver::solve(const ContactQuery& query, std::size_t k, PairResult& out
   summary.residual = out.points.residual / pressure.largest_modulus();
   summary.points = out.points.point.size();
   summary.evaluations = pressure.evaluations();
+  for (const std::uint32_t body : {pair.a, pair.b}) {
+    if (!shared_apex.empty() && shared_apex[body].pair == k) summary.evaluations += shared_apex[body].evaluations;
+  }
 }
 
 }  // namespace supple::collision

@@ -29,20 +29,30 @@ struct Partners {
   }
 };
 
+/// What find_shared_apex says of a body that several others meet.
+struct SharedApex {
+  std::optional<Apex> apex;
+  std::size_t taker = 0;
+  bool searched = false;
+  std::size_t pair = 0;           ///< whose evaluations the search counts among
+  std::uint64_t evaluations = 0;
+};
+
 /// What is asked of all pairs.
 struct ContactQuery {
   std::span<const ContactBody> bodies;
   const ContactCandidates& candidates;
   const Partners& partners;
-  std::span<const Box> boxes;  ///< of the bodies' surfaces
+  std::span<const Box> boxes;              ///< of the bodies' surfaces
+  std::span<const SharedApex> shared_apex;  ///< of the bodies; empty where no energies are asked for
   const ContactSettings& settings;
 };
 
 /// The solver of one thread; its buffers are reused.
 class PairSolver {
  public:
-  /// Before pairs of other bodies, or of bodies that have moved: what pairs of a body share is not known of these.
-  void forget() { shared_apex_.clear(); }
+  /// One search for all pairs of a body, where others may press on any of them.
+  SharedApex find_apex(const ContactQuery& query, std::uint32_t body);
   /// @param k  of the candidate pairs
   void solve(const ContactQuery& query, std::size_t k, PairResult& out);
 
@@ -66,14 +76,8 @@ class PairSolver {
   enum class Pressing : std::uint8_t { None, Some, All };
   Pressing thirds_press(const Job& job, const PairResult& out);
   bool thirds_press_beside(const Job& job, const PairResult& out);
-  /// What find_shared_apex said of a body.
-  struct SharedApex {
-    std::uint32_t body;
-    std::optional<Apex> apex;
-    std::size_t taker;
-  };
-  SharedApex shared_apex(const Job& job, std::size_t side, std::span<const std::uint32_t> partners);
-  void find_apexes(Job& job, const Partners& partners);
+  SharedApex search_apex(PairPressure& pressure, std::size_t side, const ContactQuery& query, std::uint32_t body);
+  void find_apexes(Job& job, const ContactQuery& query);
   void add_flows(const Job& job, PairResult& out);
   [[nodiscard]] static bool fills_regions(const Job& job) {
     return job.settings().energy && (job.polar.regions[0] != Region::None || job.polar.regions[1] != Region::None);
@@ -128,7 +132,6 @@ class PairSolver {
   std::vector<std::uint8_t> taken_;  ///< of points and rims, 1: a third body presses harder
   PressureBatch beside_;
   std::array<std::optional<Apex>, 2> apex_{};  ///< that what A, B lose to several bodies flows out of
-  std::vector<SharedApex> shared_apex_;
   std::vector<const ContactBody*> others_;
   bool cut_by_thirds_ = false;       ///< a third body may press harder on a part of Sigma, or of what the bodies lose
   std::optional<Taken> little_;      ///< where that is little

@@ -243,9 +243,15 @@ double Field::gradient_bound(const Box& box) const {
 }
 
 Box Field::surface_box() const {
-  const std::lock_guard lock(index_->surface_box_mutex);
-  if (!index_->surface_box) index_->surface_box = find_surface_box(index(), *this);
-  return *index_->surface_box;
+  const Index& index = *index_;
+  if (!index.surface_box_known.load(std::memory_order_acquire)) {
+    const std::lock_guard lock(index.surface_box_mutex);
+    if (!index.surface_box_known.load(std::memory_order_relaxed)) {
+      index.surface_box = find_surface_box(this->index(), *this);
+      index.surface_box_known.store(true, std::memory_order_release);
+    }
+  }
+  return index.surface_box;
 }
 
 }  // namespace supple::implicit

@@ -250,7 +250,7 @@ void index_field(const Skeleton& skeleton, const PlacedSkeleton& placed, Field& 
   index.uniform = true;
   index.convolved = false;
   index.convex = has_convex_levels(skeleton);
-  index.surface_box.reset();
+  index.surface_box_known.store(false, std::memory_order_release);
   index.core_radius.reset();
   index.control.clear();
   index.ball_radius.clear();

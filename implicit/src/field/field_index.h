@@ -101,8 +101,9 @@ struct Field::Index {
   std::size_t level_count = 0;
 
   // The surface box, computed on first use; contact uses it every step, other stages never.
+  mutable std::atomic<bool> surface_box_known{false};
   mutable std::mutex surface_box_mutex;
-  mutable std::optional<Box> surface_box;
+  mutable Box surface_box;
 
   // Scratch of the build, kept for its capacity.
   std::vector<std::uint32_t> order, order_swap;
