@@ -86,13 +86,6 @@ void PolarRuleSolver::start_rim_search(Rays& rays) {
   rim_error_ = 0.0;
 }
 
-/// Spreads the columns of both sides as far as the bodies lean away at the rim. @param across  from the axis to the rim   @return false where that is too far
-bool PolarRuleSolver::columns_reach_rim(const AlongAxis& sigma, const Vec3& across) {
-  const double norm_a = sigma.slope_a.norm(), norm_b = sigma.slope_b.norm();
-  if (!(-sigma.up_a > kUpright * norm_a) && !widen_columns(0, sigma.slope_a / -norm_a, across)) return false;
-  return sigma.up_b > kUpright * norm_b || widen_columns(1, sigma.slope_b / -norm_b, across);
-}
-
 bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error) {
   start_rim_search(rays);
   // A step that small leaves an error of its square; p vanishes at the rim, so the force feels the fourth power.
@@ -130,7 +123,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
       const bool smooth = !near || !settled || !about_middle_ || std::abs(step) <= enough * enough * radius ||
                           same_side(rim_batch_.point[k], rim_batch_.point[k] + step * e + lift * axis);
       if (near && settled && smooth) {
-        if (!columns_reach_rim(sigma, radius * e)) return false;
+        if (!columns_.reach_rim(frame_, sigma, radius * e)) return false;
         rays.outward[k] = -Vec2(sigma.slope(u), sigma.slope(v));
         // Newton's method leaves about half the square of its last step, which the area feels twice.
         rim_error_ = std::max(rim_error_, step * step / (radius * radius));
@@ -334,7 +327,7 @@ void PolarRuleSolver::start_about_peak(const PeakFrame& frame) {
   frame_ = frame;
   jacobian_ = frame.u.norm() * frame.v.norm();
   rise_.setZero();
-  spread_ = widest_ = {};
+  columns_.forget();
   cut_ = about_middle_ = false;
   estimate_ = 1.0;
   parted_ = 0;
@@ -412,7 +405,6 @@ bool PolarRuleSolver::finish(PairPressure& pressure, int column, const Regions& 
                              PatchPoints& points) {
   const bool all = regions[0] == Region::Points || regions[1] == Region::Points;
   if (turns != nullptr && all) turn(*turns, true);
-  thickness_ = 0.0;
   largest_ = frame_.peak;
   summit_ = node_.size();
   for (std::size_t i = 0; i < node_.size() && about_middle_; ++i) {
@@ -420,15 +412,10 @@ bool PolarRuleSolver::finish(PairPressure& pressure, int column, const Regions& 
     largest_ = pressure_[i];
     summit_ = i;
   }
-  for (const int side : {0, 1}) {
-    const Region region = regions[static_cast<std::size_t>(side)];
-    if (region == Region::None) {
-      if (may_go_through_ && pressure.field(side).convex() && goes_through(pressure, side, false)) return false;
-      thickness_ += 0.5 * frame_.thickness;
-    } else if (!add_columns(pressure, column, side, error, region, points)) {
-      return false;
-    }
-  }
+  const std::optional<double> thickness =
+      columns_.add(pressure, {frame_, peak_, node_, weight_, pressure_, normal_, summit_, extent_}, {column, regions, error, may_go_through_}, points);
+  if (!thickness) return false;
+  thickness_ = *thickness;
   if (turns != nullptr && !all) turn(*turns, false);
   for (std::size_t i = 0; i < node_.size(); ++i) {
     if (cut_ && area_[i] == 0.0) continue;

@@ -22,6 +22,7 @@
 #include "surface/polar/polar_cover.h"
 #include "surface/polar/polar_job.h"
 #include "surface/quadrature.h"
+#include "surface/region/polar_columns.h"
 
 namespace supple::collision {
 
@@ -63,7 +64,6 @@ class PolarRuleSolver {
   bool solve_about_peak(const PolarJob& job, const PeakFrame& frame, const AboutPeak& how, PatchPoints& points);
   void start_about_peak(const PeakFrame& frame);
   void start_rim_search(Rays& rays);
-  bool columns_reach_rim(const AlongAxis& sigma, const Vec3& across);
   bool solve_rim(PairPressure& pressure, Rays& rays, double error);
   [[nodiscard]] bool same_side(const Vec3& from, const Vec3& to) const;
   [[nodiscard]] bool rim_joins(std::size_t first, std::size_t last, bool closed) const;
@@ -75,26 +75,10 @@ class PolarRuleSolver {
   bool leave_all();
   bool finish_parted(const PolarJob& job, PatchPoints& points);
   bool finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns, PatchPoints& points);
-  // Columns through the squeezed regions: polar_columns.cpp.
-  /// Cosine of a body's normal to the columns at the rim: nearer to grazing, they are long beside it.
-  static constexpr double kUpright = 0.3;
-  /// The same of a ray to what it is to meet: nearer to grazing, it is not followed.
-  static constexpr double kLeastSight = 0.1;
   /// Where finer rules may find the rim, over its distance as it is known.
   static constexpr double kBeyondRim = 1.2;
   /// Angles that differ less are the same [rad]; of searches between two rays, a share of the angle between these, and Newton's method goes on to its square.
   static constexpr double kSameTurn = 1e-7;
-  bool widen_columns(int side, const Vec3& outward, const Vec3& across);
-  [[nodiscard]] bool lead_out(int side) const;
-  bool add_columns(PairPressure& pressure, int nodes, int side, double error, Region region, PatchPoints& points);
-  void add_energy_from_ends(PairPressure& pressure, int nodes, int side, PatchPoints& points);
-  void add_points(PairPressure& pressure, int nodes, int side, PatchPoints& points);
-  bool column_ends(PairPressure& pressure, int side, double tolerance, double inside);
-  bool end_within(PairPressure& pressure, int side);
-  bool goes_through(PairPressure& pressure, int side, bool ended);
-  bool comes_out(PairPressure& pressure, int side, Vec3 at);
-  void evaluate_on_lines(PairPressure& pressure, int side);
-  bool start_columns(int side);
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double placing_error() const;
   [[nodiscard]] double algebraic_error() const;
@@ -297,18 +281,8 @@ class PolarRuleSolver {
   void cross_star(PairPressure& pressure);
   [[nodiscard]] std::array<double, 2> outline_at(double cosine, double sine) const;
 
-  /// A line from a node through a squeezed region. Where columns spread, X = node + t way, across from the axis by 1 + t spread times as far as the
-  /// node, and t has the area of the node's foot times (1 + t spread)(narrow + t spread).
-  struct Column {
-    Vec3 way;       // of length 1 along the axis
-    Swept swept{};  // over the area across the axis
-  };
-
   PeakFrame frame_;
-  std::array<double, 2> spread_{};  // of the columns of each side, across over along [1/m], a metre from the axis
-  std::array<double, 2> widest_{};  // the same at the rim [1]
-  std::vector<Column> column_;  // by node, and that through the peak; one for all where they do not spread
-  [[nodiscard]] const Column& column(std::size_t i) const { return column_[column_.size() == 1 ? 0 : i]; }
+  PatchColumns columns_;
   Vec3 peak_ = Vec3::Zero();
   double largest_ = 0.0;
   std::size_t summit_ = 0;  // node where it is; their number: at the peak
@@ -320,9 +294,8 @@ class PolarRuleSolver {
   PressureBatch rim_batch_, crossing_batch_, node_;
   PressureBatch some_;              // points of one of these at which Newton's method has not ended
   std::vector<std::size_t> open_;   // which they are
-  std::vector<double> height_, weight_, area_, pressure_, end_[2], reached_;
-  std::vector<Vec3> foot_, normal_, line_point_, line_slope_;
-  std::vector<double> line_value_, other_value_;
+  std::vector<double> height_, weight_, area_, pressure_;
+  std::vector<Vec3> foot_, normal_;
   double residual_ = 0.0;
   double rim_error_ = 0.0;  // relative, of the area
   double lift_ = 0.0;       // largest distance of a node from Sigma

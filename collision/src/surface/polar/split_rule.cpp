@@ -325,7 +325,7 @@ void PolarRuleSolver::start_panels() {
   kept_rim_.clear();
   changes_.clear();
   residual_ = lift_ = below_ = rim_error_ = 0.0;
-  spread_ = widest_ = {};
+  columns_.forget();
 }
 
 /// The estimate, of the whole and of each panel. @return false where nothing presses
