@@ -273,17 +273,6 @@ bool PolarRuleSolver::cross_imprints(PairPressure& pressure, std::size_t ray, st
   return true;
 }
 
-PolarRuleSolver::Sheet PolarRuleSolver::sheet_of(const implicit::Kink& kink) const {
-  using Form = implicit::Kink::Form;
-  Sheet sheet;
-  sheet.flat = kink.form == Form::Plane;
-  const bool round = kink.form == Form::Offset && kink.half.isZero(0.0);
-  sheet.told = sheet.flat || round;
-  if (sheet.told) sheet.value = kink.value(frame_.origin, sheet.slope);
-  if (round) sheet.bend = 0.5 / kink.level * (kink.to_local.transpose() * kink.to_local);
-  return sheet;
-}
-
 /// Appends where a ray crosses a kink between two places with different sides of it, on the heights that are guessed.
 /// @param others  of `crossings_`, those that do not belong to this ray and kink
 void PolarRuleSolver::cross_between(PairPressure& pressure, const RaySheet& on, Interval where, Interval sides, std::size_t others) {
@@ -348,7 +337,7 @@ void PolarRuleSolver::guess_crossings(PairPressure& pressure) {
   if (cut_) sample_thirds(pressure);
   crossings_.clear();
   sheets_.clear();
-  for (const std::size_t k : crossing_) sheets_.push_back(k < kinks_.size() ? sheet_of(kinks_[k]) : Sheet{});
+  for (const std::size_t k : crossing_) sheets_.push_back(k < kinks_.size() ? sheet_of(kinks_[k], frame_.origin) : Sheet{});
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
     std::array<double, kSamples + 1> height, s;

@@ -19,6 +19,7 @@
 #include "surface/patch_points.h"
 #include "surface/polar/apex.h"
 #include "surface/polar/imprint.h"
+#include "surface/polar/outline.h"
 #include "surface/polar/polar_cover.h"
 #include "surface/polar/polar_job.h"
 #include "surface/quadrature.h"
@@ -106,13 +107,6 @@ class PolarRuleSolver {
     /// angle from where it touches it: as a polynomial, when the angle grows as a square.
     [[nodiscard]] std::array<double, 2> bend(double x) const;
   };
-  /// A kink as seen from the origin: of planes, spheres and cylinders s = value + slope . d + d . bend d, which others are asked for.
-  struct Sheet {
-    double value = 0.0;
-    Vec3 slope = Vec3::Zero();
-    Mat3 bend = Mat3::Zero();
-    bool flat = false, told = false;
-  };
   struct Corner {
     Vec3 at;                       // on the rim
     std::size_t kink;              // that meets it
@@ -123,7 +117,6 @@ class PolarRuleSolver {
     double left, right;     // it lies between these
     bool good;
   };
-  [[nodiscard]] Sheet sheet_of(const implicit::Kink& kink) const;
   bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
   bool kinks_cross(PairPressure& pressure);
@@ -182,11 +175,6 @@ class PolarRuleSolver {
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
   // Corners of the rim: rim_corners.cpp.
-  struct RimPoint {
-    Vec2 at = Vec2::Zero();       // in units of u and v
-    double height = 0.0;
-    Vec2 outward = Vec2::Zero();  // the pressure falls
-  };
   /// A kink where a ray meets it, on Sigma.
   struct KinkOnRay {
     std::size_t kink;
@@ -219,51 +207,13 @@ class PolarRuleSolver {
   void find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners);
 
   // About the middle: middle_rule.cpp.
-  /// Directions of rays as a parabola through three points near the rim, with heights.
-  struct Sector {
-    std::array<Vec2, 3> at;
-    std::array<double, 3> height;
-    bool touch_begin = false, touch_end = false;  // a ray touches an imprint there
-  };
-  /// The search for the rim along one ray: the last place inside, and one outside.
-  struct Walk {
-    Vec2 way = Vec2::Zero();
-    Vec3 along = Vec3::Zero();
-    double in = 0.0, in_height = 0.0, pressure = 0.0, slope = 0.0, bend = 0.0;  // pressure along Sigma, its first and second derivatives
-    double rise = 0.0;                   // of Sigma
-    double out = 0.0;
-    double most = 0.0;                   // length of a step that is believed
-    double passed = 0.0;                 // the last kink gone to
-    double at = 0.0, height = 0.0;       // where it looks next
-    bool fresh = true, done = false;     // without a second derivative; at the rim
-    Vec2 outward = Vec2::Zero();
-  };
   bool solve_about_middle(const PolarJob& job, const PeakFrame& frame, PatchPoints& points);
   bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings);
-  /// What ends a walk: the step over the distance gone, and the pressure [Pa].
-  struct WalkEnd {
-    double step, pressure;
-  };
-  double start_walks(PairPressure& pressure, std::span<const Vec2> ways);
-  void look_ahead(Walk& walk) const;
-  void walk_on(Walk& walk, const AlongAxis& sigma, double a, double b, const WalkEnd& end);
-  bool follow_outline(PairPressure& pressure, std::span<const Vec2> ways, double enough, std::vector<RimPoint>& out);
   bool follow_rays(PairPressure& pressure);
   bool lift_to_sigma(PairPressure& pressure);
   bool move_to_middle(PairPressure& pressure);
   bool move_off_kinks(PairPressure& pressure);
   void follow_tangents();
-  /// A place of the outline where a sector may begin.
-  struct Mark {
-    RimPoint point;
-    bool corner;
-    bool touch = false;
-  };
-  static bool on_one_ray(const Mark& a, const Mark& b);
-  static RimPoint point_between(const RimPoint& a, const RimPoint& b, const Vec2& way);
-  [[nodiscard]] std::vector<Mark> mark_outline(std::span<const RimPoint> corners) const;
-  void mark_touches(std::vector<Mark>& marks) const;
-  [[nodiscard]] bool make_sectors(std::span<const RimPoint> corners);
   void start_sectors(int nodes);
   void cross_outline();
   void place_rays(const KronrodRule& rule, std::size_t first);
@@ -271,10 +221,6 @@ class PolarRuleSolver {
 
   // About a point that sees the whole rim: star_rule.cpp.
   bool solve_about_star(const PolarJob& job, const PeakFrame& frame, bool fine, PatchPoints& points);
-  bool move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent, double step);
-  bool walk_to_rim(PairPressure& pressure, const Vec3& along, double step, Vec3& x);
-  bool follow_rim_curve(PairPressure& pressure, bool fine);
-  static std::optional<Vec2> point_that_sees(std::span<const Vec2> polygon);
   bool move_to_star(PairPressure& pressure);
   void bend_at_star(PairPressure& pressure, double rate);
   void find_star_kinks(PairPressure& pressure);
@@ -337,7 +283,6 @@ class PolarRuleSolver {
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis; 0 elsewhere
   std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;
-  std::vector<Walk> walks_;
   std::vector<Sheet> sheets_;
   std::vector<std::size_t> ray_nodes_, ray_check_;  // first node of a ray, and of those to compare with
   /// Columns of kept nodes, each with that of the nodes at hand.

@@ -9,149 +9,15 @@
 #include "supple/core/math.h"
 #include "surface/accuracy.h"
 #include "surface/polar/polar_rule.h"
+#include "surface/polar/rim_curve.h"
 
 namespace supple::collision {
 namespace {
 
-constexpr double kWalk = 0.25;          // first step to the rim, in radii of the peak
+constexpr double kWalk = 0.25;    // longest step from the peak to the centre, over the radius of the patch
 constexpr int kWalkSteps = 200;
-constexpr std::size_t kMostPoints = 400;
-constexpr double kLongest = 0.5, kLongestFine = 0.1, kShortest = 1e-3;  // steps along the rim, in radii
-constexpr double kMostTurn = 0.35, kLittleTurn = 0.15;  // of the rim within a step [rad]
-constexpr double kClose = 1e-3;         // of Newton's method at the rim, in steps
-constexpr double kLeastClearance = 0.01;    // distance of the centre from all tangents of the rim, over the radius of the patch
 
 }  // namespace
-
-/// Newton's method for p_A = p_B = 0 from x, across the curve where both vanish. @param tangent  of it [unit], counterclockwise as u and v have it
-/// @return whether it ended there
-bool PolarRuleSolver::move_to_rim(PairPressure& pressure, Vec3& x, Vec3& tangent, double step) {
-  PressureBatch& batch = rim_batch_;
-  batch.resize(1);
-  for (int iteration = 0; iteration < kFreeSteps; ++iteration) {
-    batch.point[0] = x;
-    pressure.evaluate(batch);
-    const Vec3 &a = batch.slope_a[0], &b = batch.slope_b[0];
-    tangent = a.cross(b);
-    const double square = tangent.squaredNorm();
-    if (!(square > 0.0)) return false;
-    const Vec3 move = (batch.b[0] * a - batch.a[0] * b).cross(tangent) / square;
-    const double length = move.norm();
-    if (!(length <= 2.0 * step)) return false;
-    x += move;
-    if (length <= kClose * step) {
-      tangent /= std::copysign(std::sqrt(square), frame_.u.cross(frame_.v).dot(frame_.axis));
-      return true;
-    }
-  }
-  return false;
-}
-
-/// A point of the rim, along a ray on Sigma from the origin of the frame.
-bool PolarRuleSolver::walk_to_rim(PairPressure& pressure, const Vec3& along, double step, Vec3& x) {
-  PressureBatch& batch = rim_batch_;
-  batch.resize(1);
-  const Vec3 axis = frame_.axis;
-  Vec3 inside = frame_.origin, way = along;
-  for (int iteration = 0; iteration < kWalkSteps; ++iteration) {
-    x = inside + step * way;
-    double p = 0.0;
-    for (const int newton : {0, 1, 2}) {
-      batch.point[0] = x;
-      pressure.evaluate(batch);
-      const Vec3 across = batch.slope_b[0] - batch.slope_a[0];
-      const double rate = across.dot(axis);
-      if (!(rate > kGraphCosine * across.norm())) return false;
-      const double lift = (batch.a[0] - batch.b[0]) / rate;
-      if (!(std::abs(lift) <= extent_)) return false;
-      p = (batch.a[0] * batch.slope_b[0].dot(axis) - batch.b[0] * batch.slope_a[0].dot(axis)) / rate;
-      if (newton < 2) x += lift * axis;
-    }
-    if (p <= 0.0) return true;
-    way = (x - inside) / step;
-    way = along + way.dot(axis) * axis;
-    inside = x;
-    if ((x - frame_.origin).norm() > extent_) return false;
-  }
-  return false;
-}
-
-/// The rim as a polygon in `fine_rim_`, counterclockwise as u and v have it. @param fine  in steps that do not leap over the neck of a lobe
-bool PolarRuleSolver::follow_rim_curve(PairPressure& pressure, bool fine) {
-  const double radius = std::sqrt(2.0 * frame_.peak) * std::min(frame_.u.norm(), frame_.v.norm());
-  Vec3 x, tangent;
-  if (!walk_to_rim(pressure, frame_.v.normalized(), kWalk * radius, x)) return false;
-  if (!move_to_rim(pressure, x, tangent, radius)) return false;
-  fine_rim_.clear();
-  const Vec3 first = x;
-  double step = (fine ? kLongestFine : kWalk) * radius;
-  bool left = false;  // far enough from the first point to come back to it
-  for (;;) {
-    fine_rim_.push_back(x);
-    if (fine_rim_.size() > kMostPoints) return false;
-    const double home = (x - first).norm();
-    left = left || home > 2.0 * step;
-    if (left && home <= 1.2 * step && tangent.dot(first - x) > 0.0) break;
-    for (;;) {
-      Vec3 next = x + step * tangent, there;
-      const bool found = move_to_rim(pressure, next, there, step);
-      const double turn = found ? (there - tangent).norm() : 2.0;
-      if (turn <= kMostTurn && (next - x).dot(tangent) > 0.5 * step) {
-        x = next;
-        tangent = there;
-        if (turn < kLittleTurn) step = std::min(2.0 * step, (fine ? kLongestFine : kLongest) * radius);
-        break;
-      }
-      step *= 0.5;
-      if (step < kShortest * radius) return false;
-    }
-    if ((x - frame_.origin).norm() > extent_) return false;
-  }
-  if ((fine_rim_.back() - first).norm() < 0.3 * step) fine_rim_.pop_back();
-  return true;
-}
-
-/// The centroid of the kernel of the polygon that the rim is across the axis. @return nothing where the kernel is empty
-std::optional<Vec2> PolarRuleSolver::point_that_sees(std::span<const Vec2> polygon) {
-  Vec2 low = polygon.front(), high = low;
-  for (const Vec2& x : polygon) {
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
-  }
-  std::vector<Vec2> kernel{low, {high.x(), low.y()}, high, {low.x(), high.y()}}, kept;
-  const std::size_t n = polygon.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    const Vec2 &a = polygon[i], edge = polygon[(i + 1) % n] - a;
-    kept.clear();
-    const double at_first = cross(edge, kernel.front() - a);
-    double at_p = at_first;
-    for (std::size_t k = 0; k < kernel.size(); ++k) {
-      const bool last = k + 1 == kernel.size();
-      const Vec2 &p = kernel[k], &q = last ? kernel.front() : kernel[k + 1];
-      const double at_q = last ? at_first : cross(edge, q - a);
-      if (at_p >= 0.0) kept.push_back(p);
-      if ((at_p >= 0.0) != (at_q >= 0.0)) kept.push_back(p + at_p / (at_p - at_q) * (q - p));
-      at_p = at_q;
-    }
-    kernel.swap(kept);
-    if (kernel.size() < 3) return std::nullopt;
-  }
-  double area = 0.0;
-  Vec2 first = Vec2::Zero();
-  for (std::size_t k = 1; k + 1 < kernel.size(); ++k) {
-    const double half = 0.5 * cross(kernel[k] - kernel[0], kernel[k + 1] - kernel[0]);
-    area += half;
-    first += half / 3.0 * (kernel[0] + kernel[k] + kernel[k + 1]);
-  }
-  if (!(area > 0.0)) return std::nullopt;
-  const Vec2 centre = first / area;
-  const double least = kLeastClearance * (high - low).norm();
-  for (std::size_t i = 0; i < n; ++i) {
-    const Vec2 edge = polygon[(i + 1) % n] - polygon[i];
-    if (!(cross(edge, centre - polygon[i]) > least * edge.norm())) return std::nullopt;
-  }
-  return centre;
-}
 
 /// Second derivatives of Sigma's height at the origin, by differences along its tangents. @param rate  that p_B - p_A rises at, along the axis
 void PolarRuleSolver::bend_at_star(PairPressure& pressure, double rate) {
@@ -274,7 +140,7 @@ bool PolarRuleSolver::solve_about_star(const PolarJob& job, const PeakFrame& fra
   PairPressure& pressure = job.pressure;
   frame_ = frame;
   about_middle_ = false;
-  about_star_ = follow_rim_curve(pressure, fine) && move_to_star(pressure);
+  about_star_ = RimFollower(pressure, frame_, extent_).follow(fine, fine_rim_) && move_to_star(pressure);
   if (!about_star_) return false;
   find_star_kinks(pressure);
   cross_star(pressure);
