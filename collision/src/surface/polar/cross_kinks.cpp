@@ -26,18 +26,18 @@ bool PolarRuleSolver::no_kinks_near(PairPressure& pressure) {
   const Vec3 across = (square * (frame_.u.cwiseAbs2() + frame_.v.cwiseAbs2())).cwiseSqrt();
   const Vec3 half = across + 0.5 * square * height * frame_.axis.cwiseAbs();
   smooth_ = {frame_.origin - half, frame_.origin + half};
-  kinks_.clear();
-  const bool known = pressure.kinks(smooth_, kinks_);
+  levels_.kink.clear();
+  const bool known = pressure.kinks(smooth_, levels_.kink);
   const double reach = std::sqrt(square * (frame_.u.squaredNorm() + frame_.v.squaredNorm()) + 0.25 * square * square * height * height);
-  const bool near = std::any_of(kinks_.begin(), kinks_.end(), [&](const implicit::Kink& kink) {
+  const bool near = std::any_of(levels_.kink.begin(), levels_.kink.end(), [&](const implicit::Kink& kink) {
     return std::abs(kink.value(frame_.origin)) <= kink.change(frame_.origin, reach);
   });
-  kinks_.clear();
+  levels_.kink.clear();
   return known && !near;
 }
 
 void PolarRuleSolver::find_kinks(PairPressure& pressure) {
-  kinks_.clear();
+  levels_.kink.clear();
   Box box;
   for (const Vec3& x : rim_batch_.point) {
     box.include(x);
@@ -47,59 +47,27 @@ void PolarRuleSolver::find_kinks(PairPressure& pressure) {
     box.include(frame_.origin + reach);
   }
   for (const Vec3& x : node_.point) box.include(x);
-  all_kinks_ = pressure.kinks(box, kinks_);
+  levels_.all_kinks = pressure.kinks(box, levels_.kink);
   double square = 0.0;
   for (const Vec3& x : rim_batch_.point) square = std::max(square, (x - frame_.origin).squaredNorm());
   const double reach = kBeyondRim * std::sqrt(square);
-  std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
-}
-
-/// Pressures of the third bodies at points, and their slopes.
-void PolarRuleSolver::evaluate_thirds(std::span<const Vec3> points) {
-  const std::size_t n = points.size();
-  third_value_.resize(third_.size() * n);
-  third_slope_.resize(third_.size() * n);
-  for (std::size_t t = 0; t < third_.size(); ++t) {
-    const auto value = std::span(third_value_).subspan(t * n, n);
-    const auto slope = std::span(third_slope_).subspan(t * n, n);
-    third_[t]->field.evaluate(points, value, slope);
-    for (double& v : value) v *= third_[t]->material.modulus;
-    for (Vec3& g : slope) g *= third_[t]->material.modulus;
-  }
-}
-
-/// s of a kink; of a third body, how much harder than the pair it presses where the axis through x meets Sigma, to first order.
-double PolarRuleSolver::side_of(std::size_t kink, PairPressure& pressure, const Vec3& x) {
-  if (kink < kinks_.size()) return kinks_[kink].value(x);
-  const ContactBody& body = *third_[kink - kinks_.size()];
-  const double share = frame_.depth[0] / frame_.thickness;
-  const double a = pressure.value(0, x), b = pressure.value(1, x);
-  return body.material.modulus * body.field.value(x) - (share * a + (1.0 - share) * b);
-}
-
-/// The same with its slope at point i of a batch, for which the third bodies have been evaluated.
-double PolarRuleSolver::side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const {
-  if (kink < kinks_.size()) return kinks_[kink].value(at.point[i], slope);
-  const std::size_t k = (kink - kinks_.size()) * at.size() + i;
-  const double share = frame_.depth[0] / frame_.thickness;
-  slope = third_slope_[k] - (share * at.slope_a[i] + (1.0 - share) * at.slope_b[i]);
-  return third_value_[k] - (share * at.a[i] + (1.0 - share) * at.b[i]);
+  std::erase_if(levels_.kink, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
 }
 
 /// Whether third bodies press harder than the pair all over the patch, as far as its nodes and the rim show.
 bool PolarRuleSolver::taken_by_thirds() {
   const auto taken = [this](std::size_t n, std::size_t i, double p) {
-    for (std::size_t t = 0; t < third_.size(); ++t) {
-      if (third_value_[t * n + i] > p) return true;
+    for (std::size_t t = 0; t < levels_.third.size(); ++t) {
+      if (levels_.third_value[t * n + i] > p) return true;
     }
     return false;
   };
-  evaluate_thirds(node_.point);
+  levels_.evaluate_thirds(node_.point);
   for (std::size_t i = 0; i < node_.size(); ++i) {
     if (!taken(node_.size(), i, pressure_[i])) return false;
   }
   follow_rim();
-  evaluate_thirds(fine_rim_);
+  levels_.evaluate_thirds(fine_rim_);
   for (std::size_t i = 0; i < fine_rim_.size(); ++i) {
     if (!taken(fine_rim_.size(), i, -at_rim())) return false;
   }
@@ -108,63 +76,63 @@ bool PolarRuleSolver::taken_by_thirds() {
 
 /// Whether some change their side on the patch, as far as its nodes show and the rim as they give it; keeps which.
 bool PolarRuleSolver::kinks_cross(PairPressure& pressure) {
-  crossing_.clear();
-  if (kinks_.empty() && third_.empty()) return false;
+  levels_.crossing.clear();
+  if (levels_.kink.empty() && levels_.third.empty()) return false;
   follow_rim();
-  for (std::size_t k = 0; k < kinks_.size(); ++k) {
-    if (!parts_at(kinks_[k])) continue;
-    const bool side = kinks_[k].value(frame_.origin) > 0.0;
-    const auto other = [&](const Vec3& x) { return (kinks_[k].value(x) > 0.0) != side; };
+  for (std::size_t k = 0; k < levels_.kink.size(); ++k) {
+    if (!parts_at(levels_.kink[k])) continue;
+    const bool side = levels_.kink[k].value(frame_.origin) > 0.0;
+    const auto other = [&](const Vec3& x) { return (levels_.kink[k].value(x) > 0.0) != side; };
     if (std::any_of(fine_rim_.begin(), fine_rim_.end(), other) ||
         std::any_of(node_.point.begin(), node_.point.end(), other)) {
-      crossing_.push_back(k);
+      levels_.crossing.push_back(k);
     }
   }
-  if (third_.empty()) return !crossing_.empty();
-  thirds_seen_.assign(third_.size(), 0);
-  std::vector<const Vec3*> inside(third_.size(), nullptr);
-  evaluate_thirds(node_.point);
-  for (std::size_t t = 0; t < third_.size(); ++t) {
+  if (levels_.third.empty()) return !levels_.crossing.empty();
+  thirds_seen_.assign(levels_.third.size(), 0);
+  std::vector<const Vec3*> inside(levels_.third.size(), nullptr);
+  levels_.evaluate_thirds(node_.point);
+  for (std::size_t t = 0; t < levels_.third.size(); ++t) {
     for (std::size_t i = 0; i < node_.size(); ++i) {
-      const bool harder = third_value_[t * node_.size() + i] > pressure_[i];
+      const bool harder = levels_.third_value[t * node_.size() + i] > pressure_[i];
       thirds_seen_[t] |= harder ? 1 : 2;
       if (harder && pressure_[i] > 0.0) inside[t] = &node_.point[i];
     }
   }
-  evaluate_thirds(fine_rim_);
-  for (std::size_t t = 0; t < third_.size(); ++t) {
+  levels_.evaluate_thirds(fine_rim_);
+  for (std::size_t t = 0; t < levels_.third.size(); ++t) {
     for (std::size_t i = 0; i < fine_rim_.size(); ++i) {
-      const double p = third_value_[t * fine_rim_.size() + i];
+      const double p = levels_.third_value[t * fine_rim_.size() + i];
       if (std::abs(p) > at_rim()) thirds_seen_[t] |= p > 0.0 ? 1 : 2;
     }
   }
-  imprints_.clear();
+  levels_.imprint.clear();
   cover(cover_);
-  for (std::size_t t = 0; t < third_.size(); ++t) {
+  for (std::size_t t = 0; t < levels_.third.size(); ++t) {
     if (find_imprint(pressure, t, inside[t])) thirds_seen_[t] |= 1;
-    if (thirds_seen_[t] == 3) crossing_.push_back(kinks_.size() + t);
+    if (thirds_seen_[t] == 3) levels_.crossing.push_back(levels_.kink.size() + t);
   }
-  return !crossing_.empty();
+  return !levels_.crossing.empty();
 }
 
 /// That of one third body on `cover_`. @param inside  a place in it, or null   @return whether there is one, whether its border is found or not
 bool PolarRuleSolver::find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside) {
   cover_.thickness = frame_.thickness;
-  const std::optional<Vec3> place = inside != nullptr ? std::optional<Vec3>(*inside) : finder_.find(pressure, cover_, *third_[third], 0.0);
+  const std::optional<Vec3> place = inside != nullptr ? std::optional<Vec3>(*inside) : finder_.find(pressure, cover_, *levels_.third[third], 0.0);
   if (!place) return false;
   Imprint imprint;
   imprint.third = third;
-  if (finder_.trace(pressure, cover_, *third_[third], *place, imprint)) imprints_.push_back(std::move(imprint));
+  if (finder_.trace(pressure, cover_, *levels_.third[third], *place, imprint)) levels_.imprint.push_back(std::move(imprint));
   return true;
 }
 
 /// Those on a patch with the rim `outline_`.
 void PolarRuleSolver::find_imprints(PairPressure& pressure) {
-  imprints_.clear();
-  if (third_.empty()) return;
+  levels_.imprint.clear();
+  if (levels_.third.empty()) return;
   polygon_ = outline_;
   cover(cover_);
-  for (std::size_t t = 0; t < third_.size(); ++t) find_imprint(pressure, t, nullptr);
+  for (std::size_t t = 0; t < levels_.third.size(); ++t) find_imprint(pressure, t, nullptr);
 }
 
 /// The rim found so far as a trigonometric sum, and points of it that leave no room for a kink between them.
@@ -228,7 +196,7 @@ double PolarRuleSolver::model_height(std::size_t ray, double share) const {
 /// Where a ray crosses the border of a third body whose imprint may lie between two of its samples s. @return false where they show it
 bool PolarRuleSolver::cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s) {
   if (std::count_if(s.begin(), s.end(), [](double x) { return x > 0.0; }) > 1) return false;
-  const std::size_t third = kink - kinks_.size();
+  const std::size_t third = kink - levels_.kink.size();
   const double radius = rays_.radius[ray];
   const Vec2 way(rays_.cosine[ray], rays_.sine[ray]);
   struct Sample {
@@ -236,11 +204,11 @@ bool PolarRuleSolver::cross_imprints(PairPressure& pressure, std::size_t ray, st
     bool within;
   };
   const auto look = [&](double share, bool within) -> Sample {
-    const auto [excess, height] = finder_.excess_at(pressure, frame_, *third_[third], (share * radius) * way, model_height(ray, share));
+    const auto [excess, height] = finder_.excess_at(pressure, frame_, *levels_.third[third], (share * radius) * way, model_height(ray, share));
     return {share, excess, height, within};
   };
   std::vector<Sample> samples;
-  for (const Imprint& imprint : imprints_) {
+  for (const Imprint& imprint : levels_.imprint) {
     if (imprint.third != third) continue;
     const std::optional<double> middle = imprint.middle_on(way);
     if (middle && *middle < radius) samples.push_back(look(*middle / radius, true));
@@ -285,7 +253,7 @@ void PolarRuleSolver::cross_between(PairPressure& pressure, const RaySheet& on, 
     share = where.lower + (where.upper - where.lower) * sides.lower / (sides.lower - sides.upper);
   }
   // Two of one kink must not become one; the borders of third bodies are round.
-  const bool field = on.kink < kinks_.size(), alone = crossings_.size() == others && field;
+  const bool field = on.kink < levels_.kink.size(), alone = crossings_.size() == others && field;
   const double far = alone ? kFarOff : 0.5 / kSamples;
   if (!alone && crossings_.size() > others && field) {
     Crossing& last = crossings_.back();
@@ -295,21 +263,21 @@ void PolarRuleSolver::cross_between(PairPressure& pressure, const RaySheet& on, 
   crossings_.push_back({on.ray, on.kink, share, model_height(on.ray, share), std::max(0.0, share - far), share + far, false});
 }
 
-/// A kink as a ray sees it. @param c  of `crossing_`   @param reach  of the ray
+/// A kink as a ray sees it. @param c  of `levels_.crossing`   @param reach  of the ray
 PolarRuleSolver::RaySheet PolarRuleSolver::sheet_along(std::size_t ray, std::size_t c, const Vec3& reach) const {
   const Sheet& sheet = sheets_[c];
   const Vec3 bend_along = sheet.bend * reach, bend_up = sheet.bend * frame_.axis;
-  return {ray, crossing_[c], reach, sheet.told, sheet.value, sheet.slope.dot(reach), sheet.slope.dot(frame_.axis),
+  return {ray, levels_.crossing[c], reach, sheet.told, sheet.value, sheet.slope.dot(reach), sheet.slope.dot(frame_.axis),
           bend_along.dot(reach), 2.0 * bend_along.dot(frame_.axis), bend_up.dot(frame_.axis)};
 }
 
 /// s at a share of the ray and a height above it.
 double PolarRuleSolver::side_on_ray(PairPressure& pressure, const RaySheet& on, double share, double rise) {
-  if (!on.told) return side_of(on.kink, pressure, frame_.origin + share * on.reach + rise * frame_.axis);
+  if (!on.told) return levels_.value(on.kink, frame_, pressure, frame_.origin + share * on.reach + rise * frame_.axis);
   return on.value + share * (on.along + on.square * share + on.mixed * rise) + rise * (on.up + on.up_square * rise);
 }
 
-/// How much harder than the pair third bodies press at the samples of all rays, to first order, in `third_value_`: one body after the other.
+/// How much harder than the pair third bodies press at the samples of all rays, to first order, in `levels_.third_value`: one body after the other.
 void PolarRuleSolver::sample_thirds(PairPressure& pressure) {
   PressureBatch& batch = crossing_batch_;
   batch.point.clear();
@@ -324,11 +292,11 @@ void PolarRuleSolver::sample_thirds(PairPressure& pressure) {
   pressure.evaluate_values(batch);
   const double of_a = frame_.depth[0] / frame_.thickness;
   const std::size_t n = batch.size();
-  third_value_.resize(third_.size() * n);
-  for (std::size_t t = 0; t < third_.size(); ++t) {
-    const auto value = std::span(third_value_).subspan(t * n, n);
-    third_[t]->field.evaluate(batch.point, value);
-    for (std::size_t i = 0; i < n; ++i) value[i] = third_[t]->material.modulus * value[i] - (of_a * batch.a[i] + (1.0 - of_a) * batch.b[i]);
+  levels_.third_value.resize(levels_.third.size() * n);
+  for (std::size_t t = 0; t < levels_.third.size(); ++t) {
+    const auto value = std::span(levels_.third_value).subspan(t * n, n);
+    levels_.third[t]->field.evaluate(batch.point, value);
+    for (std::size_t i = 0; i < n; ++i) value[i] = levels_.third[t]->material.modulus * value[i] - (of_a * batch.a[i] + (1.0 - of_a) * batch.b[i]);
   }
 }
 
@@ -337,16 +305,16 @@ void PolarRuleSolver::guess_crossings(PairPressure& pressure) {
   if (cut_) sample_thirds(pressure);
   crossings_.clear();
   sheets_.clear();
-  for (const std::size_t k : crossing_) sheets_.push_back(k < kinks_.size() ? sheet_of(kinks_[k], frame_.origin) : Sheet{});
+  for (const std::size_t k : levels_.crossing) sheets_.push_back(k < levels_.kink.size() ? sheet_of(levels_.kink[k], frame_.origin) : Sheet{});
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const Vec3 reach = rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]);
     std::array<double, kSamples + 1> height, s;
     for (int j = 0; j <= kSamples; ++j) height[static_cast<std::size_t>(j)] = model_height(i, static_cast<double>(j) / kSamples);
-    for (std::size_t c = 0; c < crossing_.size(); ++c) {
+    for (std::size_t c = 0; c < levels_.crossing.size(); ++c) {
       const RaySheet on = sheet_along(i, c, reach);
-      const bool field = on.kink < kinks_.size();
-      const std::size_t first = field ? 0 : ((on.kink - kinks_.size()) * rays_.size() + i) * s.size();
-      for (std::size_t j = 0; j < s.size(); ++j) s[j] = field ? side_on_ray(pressure, on, static_cast<double>(j) / kSamples, height[j]) : third_value_[first + j];
+      const bool field = on.kink < levels_.kink.size();
+      const std::size_t first = field ? 0 : ((on.kink - levels_.kink.size()) * rays_.size() + i) * s.size();
+      for (std::size_t j = 0; j < s.size(); ++j) s[j] = field ? side_on_ray(pressure, on, static_cast<double>(j) / kSamples, height[j]) : levels_.third_value[first + j];
       if (!field && cross_imprints(pressure, i, on.kink, s)) continue;
       const std::size_t others = crossings_.size();
       for (std::size_t j = 0; j < kSamples; ++j) {
@@ -384,12 +352,12 @@ void PolarRuleSolver::find_crossings(PairPressure& pressure, double error) {
                        x.height * frame_.axis;
     }
     pressure.evaluate(batch, open_, some_);
-    evaluate_thirds(batch.point);
+    levels_.evaluate_thirds(batch.point);
     std::erase_if(open_, [&](std::size_t c) {
       Crossing& x = crossings_[c];
       const Vec3 e = rays_.radius[x.ray] * direction(rays_.cosine[x.ray], rays_.sine[x.ray]);
       Vec3 slope;
-      const double s = side_of(x.kink, batch, c, slope), gap = batch.a[c] - batch.b[c];
+      const double s = levels_.value(x.kink, frame_, batch, c, slope), gap = batch.a[c] - batch.b[c];
       const Vec3 across = batch.slope_a[c] - batch.slope_b[c];
       const double gr = across.dot(e), gt = across.dot(frame_.axis), sr = slope.dot(e), st = slope.dot(frame_.axis);
       const double determinant = gr * st - gt * sr;
@@ -418,6 +386,10 @@ std::array<double, 2> PolarRuleSolver::Panel::bend(double x) const {
 /// Where neighbouring rays of the panels from `first` on meet other kinks, or in another order; only crossings that were found are kept.
 void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
+  const auto ray_end = [this](std::size_t i) -> RayEnd {
+    const Vec2 way(rays_.cosine[i], rays_.sine[i]);
+    return {way, frame_.origin + rays_.radius[i] * direction(way.x(), way.y()) + rays_.height[i] * frame_.axis};
+  };
   // Round-off says which rays meet a kink that goes through the origin.
   std::erase_if(crossings_, [](const Crossing& x) { return x.radius < kAtOrigin; });
   for (const Crossing& x : crossings_) {
@@ -448,7 +420,7 @@ void PolarRuleSolver::find_changes(PairPressure& pressure, const KronrodRule& ru
         } else if (std::max(before.size(), here.size()) == at + 1 && std::min(before.size(), here.size()) == at) {
           // One that leaves through the rim does so at a corner.
           const std::size_t kink = before.size() > at ? before[at].kink : here[at].kink, ray = (p - first) * per_panel + k;
-          if (const std::optional<double> corner = corner_between(pressure, kink, ray - 1)) {
+          if (const std::optional<double> corner = CornerFinder(pressure, frame_, levels_, extent_).between(kink, ray_end(ray - 1), ray_end(ray))) {
             share = *corner;
             panel.leaves = true;
           }

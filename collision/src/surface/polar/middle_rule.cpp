@@ -42,7 +42,7 @@ bool PolarRuleSolver::follow_rays(PairPressure& pressure) {
   std::vector<Vec2> ways;
   std::vector<RimPoint> found;
   for (std::size_t i = 0; i < rays_.size(); ++i) ways.emplace_back(rays_.cosine[i], rays_.sine[i]);
-  OutlineWalks walks(pressure, frame_, kinks_, extent_);
+  OutlineWalks walks(pressure, frame_, levels_.kink, extent_);
   if (!walks.follow(ways, kFine, found)) return false;
   for (std::size_t i = 0; i < found.size(); ++i) {
     rays_.radius[i] = walks.length(i);
@@ -98,7 +98,7 @@ bool PolarRuleSolver::move_to_middle(PairPressure& pressure) {
 bool PolarRuleSolver::move_off_kinks(PairPressure& pressure) {
   double least = kClear;
   Vec2 away = Vec2::Zero();
-  for (const implicit::Kink& kink : kinks_) {
+  for (const implicit::Kink& kink : levels_.kink) {
     Vec3 slope;
     const double value = kink.value(frame_.origin, slope);
     const Vec2 rise(slope.dot(frame_.u), slope.dot(frame_.v));
@@ -114,15 +114,15 @@ bool PolarRuleSolver::move_off_kinks(PairPressure& pressure) {
 
 /// Which kinks have points of the outline on the other side than the middle; third bodies may all cross.
 void PolarRuleSolver::cross_outline() {
-  crossing_.clear();
-  for (std::size_t k = 0; k < kinks_.size(); ++k) {
-    const bool side = kinks_[k].value(frame_.origin) > 0.0;
+  levels_.crossing.clear();
+  for (std::size_t k = 0; k < levels_.kink.size(); ++k) {
+    const bool side = levels_.kink[k].value(frame_.origin) > 0.0;
     const auto other = [&](const RimPoint& p) {
-      return (kinks_[k].value(frame_.place(p.at, p.height)) > 0.0) != side;
+      return (levels_.kink[k].value(frame_.place(p.at, p.height)) > 0.0) != side;
     };
-    if (std::any_of(outline_.begin(), outline_.end(), other)) crossing_.push_back(k);
+    if (std::any_of(outline_.begin(), outline_.end(), other)) levels_.crossing.push_back(k);
   }
-  for (std::size_t t = 0; t < third_.size(); ++t) crossing_.push_back(kinks_.size() + t);
+  for (std::size_t t = 0; t < levels_.third.size(); ++t) levels_.crossing.push_back(levels_.kink.size() + t);
 }
 
 /// The outline with the places where its tangents meet, which lie outside the patch, so that no kink hides between points of it.
@@ -185,22 +185,22 @@ bool PolarRuleSolver::solve_about_middle(const PolarJob& job, const PeakFrame& f
 bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings) {
   frame_ = frame;
   static const std::vector<Vec2> few = circle(kFewRays), many = circle(kManyRays);
-  kinks_.clear();
+  levels_.kink.clear();
   // All of both bodies: which of them a box holds depends on how it lies.
-  all_kinks_ = pressure.kinks({Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)}, kinks_);
-  if (kinks_.empty()) return false;
+  levels_.all_kinks = pressure.kinks({Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)}, levels_.kink);
+  if (levels_.kink.empty()) return false;
   frame_.u *= std::sqrt(2.0 * frame_.peak);
   frame_.v *= std::sqrt(2.0 * frame_.peak);
   for (const int round : {0, 1, 2}) {
     outline_.clear();
-    if (!OutlineWalks(pressure, frame_, kinks_, extent_).follow(round < 2 ? few : many, round < 2 ? kRough : kFine, outline_)) return false;
+    if (!OutlineWalks(pressure, frame_, levels_.kink, extent_).follow(round < 2 ? few : many, round < 2 ? kRough : kFine, outline_)) return false;
     if (round < 2 && !move_to_middle(pressure)) return false;
     if (round == 1 && !move_off_kinks(pressure)) return false;
   }
   jacobian_ = frame_.u.norm() * frame_.v.norm();
   cross_outline();
   find_imprints(pressure);
-  cut_ = !third_.empty();
+  cut_ = !levels_.third.empty();
   if (cut_) follow_tangents();  // corners of third bodies are begun there
   about_middle_ = true;
   rise_.setZero();
@@ -208,14 +208,14 @@ bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame&
   const bool fine = error < 1e-4 || cut_, fewest = error >= 1e-3 && !cut_, third = fine && error >= 1e-6 && !cut_;
   for (;;) {
     std::vector<RimPoint> corners;
-    find_outline_corners(pressure, corners);
-    if (crossing_.empty()) return false;
-    if (!make_sectors({outline_, corners, imprints_}, sectors_, polygon_)) return false;
+    CornerFinder(pressure, frame_, levels_, extent_).find_on_outline(outline_, fine_rim_, corners);
+    if (levels_.crossing.empty()) return false;
+    if (!make_sectors({outline_, corners, levels_.imprint}, sectors_, polygon_)) return false;
     start_sectors(error >= 1e-4 ? 3 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 8);
     const KronrodRule& first = kronrod_rule(fewest ? 2 : !fine || third ? 3 : 7);
-    const std::size_t crossing = crossing_.size();
+    const std::size_t crossing = levels_.crossing.size();
     if (!solve_all_panels(pressure, settings, first, third ? &kronrod_rule(7) : nullptr)) return false;
-    if (crossing_.size() == crossing) return true;
+    if (levels_.crossing.size() == crossing) return true;
     outline_ = kept_rim_;  // they show kinks that the outline did not
     std::sort(outline_.begin(), outline_.end(), [](const RimPoint& a, const RimPoint& b) { return before(a.at, b.at); });
   }

@@ -143,7 +143,7 @@ bool PolarRuleSolver::solve_rim(PairPressure& pressure, Rays& rays, double error
 bool PolarRuleSolver::same_side(const Vec3& from, const Vec3& to) const {
   constexpr double kAt = 0.01;  // of the way
   const Vec3 a = from - kAt * (to - from), b = to + kAt * (to - from);
-  return std::none_of(crossing_.begin(), crossing_.end(), [&](std::size_t k) { return k < kinks_.size() && (kinks_[k].value(a) > 0.0) != (kinks_[k].value(b) > 0.0); });
+  return std::none_of(levels_.crossing.begin(), levels_.crossing.end(), [&](std::size_t k) { return k < levels_.kink.size() && (levels_.kink[k].value(a) > 0.0) != (levels_.kink[k].value(b) > 0.0); });
 }
 
 void PolarRuleSolver::place_nodes(const PolarRule& rule) {
@@ -218,8 +218,8 @@ bool PolarRuleSolver::integrate() {
   const double lowest = -residual_ - (about_middle_ ? kBelowRim * frame_.peak : 0.0);
   PatchSums sums;
   double lift = 0.0, below = 0.0;
-  const std::size_t thirds = cut_ ? third_.size() : 0;
-  if (cut_) evaluate_thirds(node_.point);
+  const std::size_t thirds = cut_ ? levels_.third.size() : 0;
+  if (cut_) levels_.evaluate_thirds(node_.point);
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3 &slope_a = node_.slope_a[i], &slope_b = node_.slope_b[i];
     const double a = node_.a[i], b = node_.b[i];
@@ -232,7 +232,7 @@ bool PolarRuleSolver::integrate() {
     lift = std::max(lift, std::abs(a - b) / (rise + fall));
     if (!(cosine > kGraphCosine) || !(p > lowest)) return false;
     for (std::size_t t = 0; t < thirds; ++t) {
-      if (third_value_[t * n + i] > p) weight_[i] = 0.0;
+      if (levels_.third_value[t * n + i] > p) weight_[i] = 0.0;
     }
     const double area = weight_[i] / cosine, pressure = std::max(p, 0.0);
     below += std::max(-p, 0.0) * std::abs(area);
@@ -299,8 +299,8 @@ bool PolarRuleSolver::solve(const PolarJob& job, const PeakFrame& frame, const K
   size_ = std::isfinite(pressure.feature_size()) ? pressure.feature_size() : 0.0;
   extent_ = 2.0 * job.extent;
   error_ = job.settings.error;
-  third_ = third;
-  imprints_.clear();
+  levels_.third = third;
+  levels_.imprint.clear();
   peak_ = frame.origin;
   may_go_through_ = false;
   for (const int side : {0, 1}) {
@@ -332,8 +332,8 @@ void PolarRuleSolver::start_about_peak(const PeakFrame& frame) {
   estimate_ = 1.0;
   parted_ = 0;
   polygon_.clear();
-  kinks_.clear();
-  all_kinks_ = true;  // where none are looked for
+  levels_.kink.clear();
+  levels_.all_kinks = true;  // where none are looked for
 }
 
 bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& frame, const AboutPeak& how, PatchPoints& points) {
@@ -343,11 +343,11 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
   const double error = job.settings.error;
   start_about_peak(frame);
   const std::span<const PolarRule> rules = polar_rules();
-  const bool parts = error < kSplitBelow || !third_.empty();
+  const bool parts = error < kSplitBelow || !levels_.third.empty();
   // Patches that need more at coarse errors are uneven: there two rules agree by chance.
   const std::size_t most = parts || any ? rules.size() - 1 : kMostCoarse;
   const std::size_t last = std::min<std::size_t>(most, static_cast<std::size_t>(std::max(job.settings.max_refinement, 1)));
-  bool smooth = error < kSplitBelow && third_.empty() && no_kinks_near(pressure);
+  bool smooth = error < kSplitBelow && levels_.third.empty() && no_kinks_near(pressure);
   std::size_t first = std::min(first_rule(error, smooth), last - 1);
   double difference = 0.0;
   for (std::size_t r = first; r <= last; ++r) {
@@ -366,13 +366,13 @@ bool PolarRuleSolver::solve_about_peak(const PolarJob& job, const PeakFrame& fra
     if (!integrate()) return false;
     if (round) keep_along_axis(fine_);
     if (!smooth && r == first && error < kSplitBelow) find_kinks(pressure);
-    if (round && !kinks_.empty()) {
+    if (round && !levels_.kink.empty()) {
       round = false;
       r = first - 1;
       continue;
     }
-    if (!third_.empty() && taken_by_thirds()) return leave_all();
-    if (parts && !(any && third_.empty()) && kinks_cross(pressure)) return solve_split(pressure, job.settings) && finish_parted(job, points);
+    if (!levels_.third.empty() && taken_by_thirds()) return leave_all();
+    if (parts && !(any && levels_.third.empty()) && kinks_cross(pressure)) return solve_split(pressure, job.settings) && finish_parted(job, points);
     if (r == first) continue;
     const double last_difference = difference;
     difference = smooth ? std::max(error_where_smooth(fine_, coarse_), kOfLastWhereSmooth * last_difference) : error_at_kinks(r, fine_, coarse_);
@@ -396,7 +396,7 @@ bool PolarRuleSolver::leave_all() {
 
 /// The same as `finish`, of a patch that was parted.
 bool PolarRuleSolver::finish_parted(const PolarJob& job, PatchPoints& points) {
-  parted_ = static_cast<std::uint32_t>(crossing_.size());
+  parted_ = static_cast<std::uint32_t>(levels_.crossing.size());
   return finish(job.pressure, column_of(job.settings.error), job.regions, job.settings.error, nullptr, points);
 }
 

@@ -20,8 +20,10 @@
 #include "surface/polar/apex.h"
 #include "surface/polar/imprint.h"
 #include "surface/polar/outline.h"
+#include "surface/polar/patch_levels.h"
 #include "surface/polar/polar_cover.h"
 #include "surface/polar/polar_job.h"
+#include "surface/polar/rim_corners.h"
 #include "surface/quadrature.h"
 #include "surface/region/polar_columns.h"
 
@@ -78,8 +80,6 @@ class PolarRuleSolver {
   bool finish(PairPressure& pressure, int column, const Regions& regions, double error, const PolarRule* turns, PatchPoints& points);
   /// Where finer rules may find the rim, over its distance as it is known.
   static constexpr double kBeyondRim = 1.2;
-  /// Angles that differ less are the same [rad]; of searches between two rays, a share of the angle between these, and Newton's method goes on to its square.
-  static constexpr double kSameTurn = 1e-7;
   void start_rim(const PolarRule& rule, bool first);
   [[nodiscard]] double placing_error() const;
   [[nodiscard]] double algebraic_error() const;
@@ -107,10 +107,6 @@ class PolarRuleSolver {
     /// angle from where it touches it: as a polynomial, when the angle grows as a square.
     [[nodiscard]] std::array<double, 2> bend(double x) const;
   };
-  struct Corner {
-    Vec3 at;                       // on the rim
-    std::size_t kink;              // that meets it
-  };
   struct Crossing {
     std::size_t ray, kink;
     double radius, height;  // radius over that of the rim
@@ -126,9 +122,6 @@ class PolarRuleSolver {
   [[nodiscard]] bool taken_by_thirds();
   bool find_imprint(PairPressure& pressure, std::size_t third, const Vec3* inside);
   void find_imprints(PairPressure& pressure);
-  void evaluate_thirds(std::span<const Vec3> points);
-  [[nodiscard]] double side_of(std::size_t kink, PairPressure& pressure, const Vec3& x);
-  [[nodiscard]] double side_of(std::size_t kink, const PressureBatch& at, std::size_t i, Vec3& slope) const;
   /// An angle at which panels end.
   struct Turn {
     double angle;
@@ -173,38 +166,6 @@ class PolarRuleSolver {
   void refine_panel(const Panel& panel, const Finer& how, bool halve, std::vector<Panel>& finer);
   void gather_panels();
   [[nodiscard]] double model_height(std::size_t ray, double share) const;
-
-  // Corners of the rim: rim_corners.cpp.
-  /// A kink where a ray meets it, on Sigma.
-  struct KinkOnRay {
-    std::size_t kink;
-    Vec2 way;                      // the ray's direction, of any length
-    double rim, height;            // rim near there, in units of `way`, as is `radius`
-    bool dip = false;               // the pressure along the kink comes near to 0 there
-    double radius = 0.0;
-    bool met = false;
-    bool positive = false;         // s at the rim, which lies beyond the kink where the pressure is above 0
-    double pressure = 0.0, rate = 0.0;  // over the angle
-  };
-  /// A corner is sought between the rays `left` and `right`: at left + place (right - left).
-  struct CornerSearch {
-    std::size_t kink;
-    Vec2 left, right;
-    double rim_left, rim_right;
-    bool positive_left;            // s at the rim on the left
-    double place, height;
-    double from = 0.0, to = 1.0;
-    std::optional<Vec2> at = std::nullopt;
-  };
-  static void follow_signs(std::span<const double> values, std::vector<double>& places);
-  void move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last);
-  void find_corners(PairPressure& pressure, std::size_t least, std::vector<Corner>& corners);
-  [[nodiscard]] std::optional<double> corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray);
-  void meet_kinks(PairPressure& pressure, double close, std::span<KinkOnRay> rays);
-  void find_corners_between(PairPressure& pressure, std::span<CornerSearch> searches);
-  void add_vertices(std::vector<RimPoint>& rays) const;
-  [[nodiscard]] std::vector<KinkOnRay> kinks_on_rays(PairPressure& pressure);
-  void find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners);
 
   // About the middle: middle_rule.cpp.
   bool solve_about_middle(const PolarJob& job, const PeakFrame& frame, PatchPoints& points);
@@ -253,20 +214,13 @@ class PolarRuleSolver {
   bool may_go_through_ = false;  // one body through the other: not balls and half-spaces, whose surfaces meet in one circle, and not where third bodies press
 
   double error_ = 0.0;                 // asked for
-  Thirds third_;
+  PatchLevels levels_;
   bool cut_ = false;                   // nodes where a third body presses harder do not count
-  std::vector<double> third_value_;    // pressures of third bodies at points, one body after the other
-  std::vector<Vec3> third_slope_;
   std::vector<int> thirds_seen_;        // 1: pressing harder than the pair somewhere, 2: not so somewhere
   ImprintFinder finder_;
-  std::vector<Imprint> imprints_;
   PolarCover cover_;
   std::uint32_t parted_ = 0;
-  std::vector<implicit::Kink> kinks_;
-  bool all_kinks_ = false;             // these are all of both fields
   Box smooth_;                         // no kink is in it
-  std::vector<implicit::Kink> near_kinks_;
-  std::vector<std::size_t> crossing_;  // kinks that cross the patch; from kinks_.size() on, third bodies
   std::vector<Panel> panels_;
   struct Wave {
     Eigen::ArrayXd cosine, sine;

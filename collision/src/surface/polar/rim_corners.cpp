@@ -9,7 +9,7 @@
 #include "numbers.h"
 #include "supple/core/math.h"
 #include "surface/accuracy.h"
-#include "surface/polar/polar_rule.h"
+#include "surface/polar/rim_corners.h"
 
 namespace supple::collision {
 namespace {
@@ -51,7 +51,7 @@ void for_neighbours(const Rays& rays, const Body& body) {
 
 /// Where a function changes its sign around a closed line, from its values at points of it: i + t lies between points i and i + 1.
 /// Between two changes that no point saw, or one alone, it is the parabola through three points.
-void PolarRuleSolver::follow_signs(std::span<const double> values, std::vector<double>& places) {
+void follow_signs(std::span<const double> values, std::vector<double>& places) {
   const std::size_t n = values.size();
   const auto at = [&](std::size_t i) { return values[i % n]; };
   const auto alone = [&](std::size_t i) { return (at(i + n - 1) > 0.0) != (at(i) > 0.0) && (at(i + 1) > 0.0) != (at(i) > 0.0); };
@@ -76,16 +76,17 @@ void PolarRuleSolver::follow_signs(std::span<const double> values, std::vector<d
 }
 
 /// Newton's method to where kinks meet the rim, p_A = p_B = s = 0. @param kink  of each point   @param last  lengths of the last steps
-void PolarRuleSolver::move_to_corners(PairPressure& pressure, std::span<const std::size_t> kink, PressureBatch& batch, std::vector<double>& last) {
+void CornerFinder::move_to_corners(std::span<const std::size_t> kink, std::vector<double>& last) {
+  PressureBatch& batch = batch_;
   batch.resize(batch.point.size());
   last.assign(kink.size(), 0.0);
   for (int step = 0; step < kFreeSteps; ++step) {
-    pressure.evaluate(batch);
-    evaluate_thirds(batch.point);
+    pressure_.evaluate(batch);
+    levels_.evaluate_thirds(batch.point);
     bool moved = false;
     for (std::size_t i = 0; i < kink.size(); ++i) {
       Vec3 slope;
-      const double s = side_of(kink[i], batch, i, slope);
+      const double s = levels_.value(kink[i], frame_, batch, i, slope);
       Mat3 rows;
       rows.row(0) = batch.slope_a[i];
       rows.row(1) = batch.slope_b[i];
@@ -103,17 +104,15 @@ void PolarRuleSolver::move_to_corners(PairPressure& pressure, std::span<const st
   }
 }
 
-/// Where kinks meet the rim, begun between points of `fine_rim_`. @param least  of kinks, the first
-void PolarRuleSolver::find_corners(PairPressure& pressure, std::size_t least, std::vector<Corner>& corners) {
-  const std::vector<Vec3>& rim = fine_rim_;
+void CornerFinder::find(std::span<const Vec3> rim, std::size_t least, std::vector<Corner>& corners) {
   const std::size_t n = rim.size();
   std::vector<std::size_t> kink;
   std::vector<double> sides(n), places;
-  PressureBatch& batch = rim_batch_;
+  PressureBatch& batch = batch_;
   batch.point.clear();
-  for (const std::size_t k : crossing_) {
+  for (const std::size_t k : levels_.crossing) {
     if (k < least) continue;
-    for (std::size_t i = 0; i < n; ++i) sides[i] = side_of(k, pressure, rim[i]);
+    for (std::size_t i = 0; i < n; ++i) sides[i] = levels_.value(k, frame_, pressure_, rim[i]);
     places.clear();
     follow_signs(sides, places);
     for (const double place : places) {
@@ -123,14 +122,14 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::size_t least, st
       kink.push_back(k);
     }
   }
-  for (const Imprint& imprint : imprints_) {
-    if (std::find(crossing_.begin(), crossing_.end(), kinks_.size() + imprint.third) == crossing_.end()) continue;
+  for (const Imprint& imprint : levels_.imprint) {
+    if (std::find(levels_.crossing.begin(), levels_.crossing.end(), levels_.kink.size() + imprint.third) == levels_.crossing.end()) continue;
     batch.point.insert(batch.point.end(), imprint.leaves.begin(), imprint.leaves.end());
-    kink.resize(batch.point.size(), kinks_.size() + imprint.third);
+    kink.resize(batch.point.size(), levels_.kink.size() + imprint.third);
   }
   if (kink.empty()) return;
   std::vector<double> last;
-  move_to_corners(pressure, kink, batch, last);
+  move_to_corners(kink, last);
   for (std::size_t i = 0; i < kink.size(); ++i) {
     const auto same = [&](std::size_t j) { return kink[j] == kink[i] && (batch.point[j] - batch.point[i]).norm() <= 1e-6 * extent_; };
     bool found = last[i] <= 1e-6 * extent_;  // the panels find others by being parted
@@ -139,32 +138,24 @@ void PolarRuleSolver::find_corners(PairPressure& pressure, std::size_t least, st
   }
 }
 
-/// Share of the angle between a ray and the next one at which a kink meets the rim, where its sides say that it does.
-std::optional<double> PolarRuleSolver::corner_between(PairPressure& pressure, std::size_t kink, std::size_t ray) {
-  const auto rim_point = [this](std::size_t i) -> Vec3 {
-    return frame_.origin + rays_.radius[i] * direction(rays_.cosine[i], rays_.sine[i]) + rays_.height[i] * frame_.axis;
-  };
-  const Vec3 a = rim_point(ray), b = rim_point(ray + 1);
-  const double left = side_of(kink, pressure, a), right = side_of(kink, pressure, b);
+std::optional<double> CornerFinder::between(std::size_t level, const RayEnd& first, const RayEnd& second) {
+  const Vec3 &a = first.place, &b = second.place;
+  const double left = levels_.value(level, frame_, pressure_, a), right = levels_.value(level, frame_, pressure_, b);
   if ((left > 0.0) == (right > 0.0)) return std::nullopt;
   const double share = left / (left - right);
-  crossing_batch_.point.assign(1, a + share * (b - a));
+  batch_.point.assign(1, a + share * (b - a));
   std::vector<double> last;
-  move_to_corners(pressure, {&kink, 1}, crossing_batch_, last);
-  const Vec3 d = crossing_batch_.point[0] - frame_.origin;
-  const Vec2 way = frame_.parts_of(d);
-  const auto angle = [&](const Vec2& to) {
-    const double c = rays_.cosine[ray], s = rays_.sine[ray];
-    return math::atan2(c * to.y() - s * to.x(), c * to.x() + s * to.y());
-  };
-  const double exact = angle(way) / angle(Vec2(rays_.cosine[ray + 1], rays_.sine[ray + 1]));
+  move_to_corners({&level, 1}, last);
+  const Vec2 way = frame_.parts_of(batch_.point[0] - frame_.origin);
+  const auto angle = [&](const Vec2& to) { return math::atan2(cross(first.way, to), first.way.dot(to)); };
+  const double exact = angle(way) / angle(second.way);
   return exact > 0.0 && exact < 1.0 ? exact : share;
 }
 
 /// Where rays meet their kinks on Sigma, and the pressure there: that of minus infinity far outside. The height is to be near it.
 /// @param close  distance from Sigma, in the overlap, at which the pressure is that there
-void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span<KinkOnRay> rays) {
-  PressureBatch& batch = crossing_batch_;
+void CornerFinder::meet_kinks(double close, std::span<KinkOnRay> rays) {
+  PressureBatch& batch = batch_;
   const auto place = [&](const KinkOnRay& ray) -> Vec3 {
     return frame_.origin + ray.radius * frame_.across(ray.way) + ray.height * frame_.axis;
   };
@@ -172,7 +163,7 @@ void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span
   for (std::size_t i = 0; i < rays.size(); ++i) {
     rays[i].radius = rays[i].rim;
     rays[i].pressure = -kInfinity;
-    rays[i].positive = kinks_[rays[i].kink].value(place(rays[i])) > 0.0;
+    rays[i].positive = levels_.kink[rays[i].kink].value(place(rays[i])) > 0.0;
     open.push_back(i);
   }
   for (int step = 0; step < kFreeSteps && !open.empty(); ++step) {
@@ -182,7 +173,7 @@ void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span
       double move = 0.0;
       for (int k = 0; k < kFreeSteps; ++k) {
         Vec3 slope;
-        const double s = kinks_[ray.kink].value(place(ray), slope);
+        const double s = levels_.kink[ray.kink].value(place(ray), slope);
         move = -s / slope.dot(along);
         ray.radius += move;
         if (std::abs(move) <= kMet * ray.rim) break;
@@ -192,14 +183,14 @@ void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span
     });
     batch.resize(open.size());
     for (std::size_t j = 0; j < open.size(); ++j) batch.point[j] = place(rays[open[j]]);
-    pressure.evaluate(batch);
+    pressure_.evaluate(batch);
     std::size_t next = 0;
     std::erase_if(open, [&](std::size_t i) {
       KinkOnRay& ray = rays[i];
       const std::size_t j = next++;
       const Vec3 &a = batch.slope_a[j], &b = batch.slope_b[j], g = a - b;
       Vec3 slope;
-      static_cast<void>(kinks_[ray.kink].value(batch.point[j], slope));
+      static_cast<void>(levels_.kink[ray.kink].value(batch.point[j], slope));
       const Vec3 along = frame_.across(ray.way), across = ray.radius * frame_.across({-ray.way.y(), ray.way.x()});
       const double s_along = slope.dot(along), s_up = slope.dot(frame_.axis), s_across = slope.dot(across);
       const double g_along = g.dot(along), g_up = g.dot(frame_.axis), g_across = g.dot(across), determinant = s_along * g_up - s_up * g_along;
@@ -221,7 +212,7 @@ void PolarRuleSolver::meet_kinks(PairPressure& pressure, double close, std::span
 }
 
 /// Corners between two rays whose ends on the rim lie on different sides of a kink. @return in each `at`, nothing where it is not found
-void PolarRuleSolver::find_corners_between(PairPressure& pressure, std::span<CornerSearch> searches) {
+void CornerFinder::find_between(std::span<CornerSearch> searches) {
   std::vector<std::size_t> open;
   std::vector<KinkOnRay> rays;
   for (std::size_t i = 0; i < searches.size(); ++i) open.push_back(i);
@@ -232,7 +223,7 @@ void PolarRuleSolver::find_corners_between(PairPressure& pressure, std::span<Cor
       const double rim = search.rim_left + search.place * (search.rim_right - search.rim_left);
       rays.push_back({search.kink, search.left + search.place * (search.right - search.left), rim, search.height});
     }
-    meet_kinks(pressure, kClose, rays);
+    meet_kinks(kClose, rays);
     std::size_t next = 0;
     std::erase_if(open, [&](std::size_t i) {
       const KinkOnRay& ray = rays[next++];
@@ -253,26 +244,26 @@ void PolarRuleSolver::find_corners_between(PairPressure& pressure, std::span<Cor
 }
 
 /// Directions of places near the rim at which two kinks meet: edges that rays meet there are short.
-void PolarRuleSolver::add_vertices(std::vector<RimPoint>& rays) const {
-  const std::size_t n = outline_.size();
+void CornerFinder::add_vertices(std::span<const RimPoint> outline, std::vector<RimPoint>& rays) const {
+  const std::size_t n = outline.size();
   std::vector<double> distance;  // of each kink from each point of the outline, in ways to the next
-  for (const implicit::Kink& kink : kinks_) {
+  for (const implicit::Kink& kink : levels_.kink) {
     for (std::size_t i = 0; i < n; ++i) {
-      const Vec2 chord = outline_[(i + 1) % n].at - outline_[i].at;
-      distance.push_back(std::abs(kink.value(frame_.place(outline_[i].at, outline_[i].height))) / frame_.across(chord).norm());
+      const Vec2 chord = outline[(i + 1) % n].at - outline[i].at;
+      distance.push_back(std::abs(kink.value(frame_.place(outline[i].at, outline[i].height))) / frame_.across(chord).norm());
     }
   }
-  for (std::size_t j = 0; j < kinks_.size(); ++j) {
+  for (std::size_t j = 0; j < levels_.kink.size(); ++j) {
     for (std::size_t k = 0; k < j; ++k) {
       const auto far = [&](std::size_t i) { return std::max(distance[j * n + i % n], distance[k * n + i % n]); };
       for (std::size_t i = 0; i < n; ++i) {
         if (!(far(i) <= kBeside) || far(i + n - 1) < far(i) || far(i + 1) <= far(i)) continue;
-        Vec2 at = outline_[i].at;
+        Vec2 at = outline[i].at;
         bool met = false;
         for (int step = 0; step < kFreeSteps && !met; ++step) {
           Vec3 one, other;
-          const Vec3 x = frame_.place(at, outline_[i].height);
-          const Vec2 s(kinks_[j].value(x, one), kinks_[k].value(x, other));
+          const Vec3 x = frame_.place(at, outline[i].height);
+          const Vec2 s(levels_.kink[j].value(x, one), levels_.kink[k].value(x, other));
           const Vec2 a(one.dot(frame_.u), one.dot(frame_.v)), b(other.dot(frame_.u), other.dot(frame_.v));
           if (!(std::abs(cross(a, b)) > kParallel * a.norm() * b.norm())) break;
           const Vec2 move = meeting_of(a, -s[0], b, -s[1]);
@@ -280,26 +271,26 @@ void PolarRuleSolver::add_vertices(std::vector<RimPoint>& rays) const {
           met = move.norm() <= kMet * at.norm();
         }
         if (!met) continue;
-        const bool after = cross(outline_[i].at, at) > 0.0;
-        const RimPoint &p = outline_[after ? i : (i + n - 1) % n], &q = outline_[after ? (i + 1) % n : i];
+        const bool after = cross(outline[i].at, at) > 0.0;
+        const RimPoint &p = outline[after ? i : (i + n - 1) % n], &q = outline[after ? (i + 1) % n : i];
         const double beyond = cross(p.at, at), left = cross(at, q.at), share = cross(p.at, q.at) / (beyond + left);  // of the radius of the chord
-        if (beyond > 0.0 && left > 0.0 && share >= kLeastShare) rays.push_back({at, outline_[i].height, Vec2::Zero()});
+        if (beyond > 0.0 && left > 0.0 && share >= kLeastShare) rays.push_back({at, outline[i].height, Vec2::Zero()});
       }
     }
   }
 }
 
 /// Where the rays of the outline, and rays between them on which the pressure along a kink comes near to 0, meet the kinks that are near; by kink and angle.
-std::vector<PolarRuleSolver::KinkOnRay> PolarRuleSolver::kinks_on_rays(PairPressure& pressure) {
-  std::vector<RimPoint> points = outline_;
-  add_vertices(points);
+std::vector<CornerFinder::KinkOnRay> CornerFinder::kinks_on_rays(std::span<const RimPoint> outline) {
+  std::vector<RimPoint> points(outline.begin(), outline.end());
+  add_vertices(outline, points);
   std::vector<KinkOnRay> all, fresh;
-  for (std::size_t k = 0; k < kinks_.size(); ++k) {
+  for (std::size_t k = 0; k < levels_.kink.size(); ++k) {
     const auto far = [&](const RimPoint& p) {
       const Vec3 x = frame_.place(p.at, p.height);
-      return std::abs(kinks_[k].value(x)) > kinks_[k].change(x, kNearRim * frame_.across(p.at).norm());
+      return std::abs(levels_.kink[k].value(x)) > levels_.kink[k].change(x, kNearRim * frame_.across(p.at).norm());
     };
-    const bool crosses = std::binary_search(crossing_.begin(), crossing_.end(), k);
+    const bool crosses = std::binary_search(levels_.crossing.begin(), levels_.crossing.end(), k);
     if (!crosses && std::all_of(points.begin(), points.end(), far)) continue;
     for (const RimPoint& p : points) {
       const double length = p.at.norm();
@@ -307,7 +298,7 @@ std::vector<PolarRuleSolver::KinkOnRay> PolarRuleSolver::kinks_on_rays(PairPress
     }
   }
   for (int round = 0; round <= kDipRounds && !fresh.empty(); ++round) {
-    meet_kinks(pressure, kRough, fresh);
+    meet_kinks(kRough, fresh);
     all.insert(all.end(), fresh.begin(), fresh.end());
     std::stable_sort(all.begin(), all.end(), [](const KinkOnRay& a, const KinkOnRay& b) { return a.kink != b.kink ? a.kink < b.kink : before(a.way, b.way); });
     fresh.clear();
@@ -323,9 +314,8 @@ std::vector<PolarRuleSolver::KinkOnRay> PolarRuleSolver::kinks_on_rays(PairPress
   return all;
 }
 
-/// Where kinks meet the rim, between rays of the outline; those that do cross the patch.
-void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<RimPoint>& corners) {
-  const std::vector<KinkOnRay> all = kinks_on_rays(pressure);
+void CornerFinder::find_on_outline(std::span<const RimPoint> outline, std::span<const Vec3> rim, std::vector<RimPoint>& corners) {
+  const std::vector<KinkOnRay> all = kinks_on_rays(outline);
   // Where the strip beyond an edge all but ends, its width has a kink.
   for (const KinkOnRay& ray : all) {
     if (ray.dip && ray.pressure > 0.0) corners.push_back({ray.radius * ray.way, ray.height, Vec2::Zero()});
@@ -337,15 +327,15 @@ void PolarRuleSolver::find_outline_corners(PairPressure& pressure, std::vector<R
     const KinkOnRay& near = ray.pressure > next.pressure ? ray : next;
     searches.push_back({ray.kink, ray.way, next.way, ray.rim, next.rim, ray.positive, both ? ray.pressure / (ray.pressure - next.pressure) : 0.5, near.height});
   });
-  find_corners_between(pressure, searches);
+  find_between(searches);
   std::erase_if(searches, [](const CornerSearch& search) { return !search.at; });
   for (const CornerSearch& search : searches) {
-    const auto place = std::lower_bound(crossing_.begin(), crossing_.end(), search.kink);
-    if (place == crossing_.end() || *place != search.kink) crossing_.insert(place, search.kink);
+    const auto place = std::lower_bound(levels_.crossing.begin(), levels_.crossing.end(), search.kink);
+    if (place == levels_.crossing.end() || *place != search.kink) levels_.crossing.insert(place, search.kink);
   }
   for (const CornerSearch& search : searches) corners.push_back({*search.at, search.height, Vec2::Zero()});
   std::vector<Corner> found;
-  find_corners(pressure, kinks_.size(), found);
+  find(rim, levels_.kink.size(), found);
   for (const Corner& corner : found) {
     const Vec3 d = corner.at - frame_.origin;
     corners.push_back({frame_.parts_of(d), d.dot(frame_.axis), Vec2::Zero()});

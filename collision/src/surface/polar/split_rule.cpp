@@ -227,7 +227,7 @@ void PolarRuleSolver::keep_panel(Panel& panel, const KronrodRule& rule, std::siz
 void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
   panel.by_angle = share_of_difference(panel.fine, panel.angular, all);
   panel.by_radius = share_of_difference(panel.angular, panel.radial, all);
-  const bool regular = all_kinks_ && !about_middle_ && std::all_of(kinks_.begin(), kinks_.end(), [this](const implicit::Kink& kink) { return parts_at(kink); });
+  const bool regular = levels_.all_kinks && !about_middle_ && std::all_of(levels_.kink.begin(), levels_.kink.end(), [this](const implicit::Kink& kink) { return parts_at(kink); });
   if (regular) panel.by_radius = error_of_finer(panel.by_radius);
   if (regular && panel.even()) panel.by_angle = error_of_finer(panel.by_angle);
   if (panel.lost) {
@@ -240,14 +240,14 @@ void PolarRuleSolver::doubt(Panel& panel, const PatchSums& all) const {
 /// one comes again at the end, a whole turn later.
 std::vector<PolarRuleSolver::Turn> PolarRuleSolver::find_turns(PairPressure& pressure) {
   std::vector<Corner> corners;
-  find_corners(pressure, 0, corners);
+  CornerFinder(pressure, frame_, levels_, extent_).find(fine_rim_, 0, corners);
   std::vector<Turn> turns;
   const auto add = [&turns](const Vec2& way, bool touch) {
     const double turn = math::atan2(way.y(), way.x());
     turns.push_back({turn < 0.0 ? turn + kTurn : turn, touch});
   };
   for (const Corner& corner : corners) add(frame_.parts_of(corner.at - frame_.origin), false);
-  for (const Imprint& imprint : imprints_) {
+  for (const Imprint& imprint : levels_.imprint) {
     for (const Vec2& way : imprint.touches) add(way, true);
   }
   if (turns.empty()) turns.push_back({0.0, false});
@@ -269,11 +269,11 @@ std::vector<PolarRuleSolver::Turn> PolarRuleSolver::find_turns(PairPressure& pre
 
 bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings& settings) {
   const double error = settings.error;
-  cut_ = !crossing_.empty() && crossing_.back() >= kinks_.size();
+  cut_ = !levels_.crossing.empty() && levels_.crossing.back() >= levels_.kink.size();
   const bool fine = error < 1e-4;
   const KronrodRule& rule = kronrod_rule(fine ? 7 : 3);
   const int radial = error >= 1e-3 ? 4 : !fine ? 4 : error >= 1e-6 ? 5 : error >= 1e-8 ? 7 : 10;
-  const double widest = about_star_ && crossing_.empty() ? kWidestOfStar : fine ? kWidest : kWidestCoarse;
+  const double widest = about_star_ && levels_.crossing.empty() ? kWidestOfStar : fine ? kWidest : kWidestCoarse;
   about_middle_ = false;
   for (;;) {
     const std::vector<Turn> turns = find_turns(pressure);
@@ -291,27 +291,27 @@ bool PolarRuleSolver::solve_split(PairPressure& pressure, const ContactSettings&
         panels_.push_back(panel);
       }
     }
-    const std::size_t crossing = crossing_.size();
+    const std::size_t crossing = levels_.crossing.size();
     if (!solve_all_panels(pressure, settings, rule, nullptr)) return false;
-    if (crossing_.size() == crossing) return true;
+    if (levels_.crossing.size() == crossing) return true;
   }
 }
 
 /// Kinks that only the points of the rim on all rays show to cross the patch; these points are kept. @return whether there are any
 bool PolarRuleSolver::add_missed_kinks() {
-  const std::size_t crossing = crossing_.size();
+  const std::size_t crossing = levels_.crossing.size();
   std::vector<double> sides(kept_rim_.size()), places;
   fine_rim_.clear();
   for (const RimPoint& p : kept_rim_) fine_rim_.push_back(frame_.place(p.at, p.height));
-  for (std::size_t k = 0; k < kinks_.size(); ++k) {
-    if (!parts_at(kinks_[k]) || std::find(crossing_.begin(), crossing_.end(), k) != crossing_.end()) continue;
-    for (std::size_t i = 0; i < sides.size(); ++i) sides[i] = kinks_[k].value(fine_rim_[i]);
+  for (std::size_t k = 0; k < levels_.kink.size(); ++k) {
+    if (!parts_at(levels_.kink[k]) || std::find(levels_.crossing.begin(), levels_.crossing.end(), k) != levels_.crossing.end()) continue;
+    for (std::size_t i = 0; i < sides.size(); ++i) sides[i] = levels_.kink[k].value(fine_rim_[i]);
     places.clear();
     follow_signs(sides, places);
-    if (!places.empty()) crossing_.push_back(k);
+    if (!places.empty()) levels_.crossing.push_back(k);
   }
-  if (crossing_.size() == crossing) return false;
-  std::sort(crossing_.begin(), crossing_.end());
+  if (levels_.crossing.size() == crossing) return false;
+  std::sort(levels_.crossing.begin(), levels_.crossing.end());
   return true;
 }
 
@@ -392,7 +392,7 @@ void PolarRuleSolver::gather_panels() {
   kept_rim_.swap(sorted_rim_);
 }
 
-/// Halves panels until the estimate is low enough; then nodes and sums of all are in place, unless `crossing_` grew by kinks that the rim shows.
+/// Halves panels until the estimate is low enough; then nodes and sums of all are in place, unless `levels_.crossing` grew by kinks that the rim shows.
 /// @param larger  rule that panels get before they are halved, or null
 bool PolarRuleSolver::solve_all_panels(PairPressure& pressure, const ContactSettings& settings, const KronrodRule& first, const KronrodRule* larger) {
   const KronrodRule* rule = &first;

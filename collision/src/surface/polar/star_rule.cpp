@@ -95,29 +95,29 @@ void PolarRuleSolver::find_star_kinks(PairPressure& pressure) {
   double square = 0.0;
   for (const Vec3& x : fine_rim_) square = std::max(square, (x - frame_.origin).squaredNorm());
   const double reach = kBeyondRim * std::sqrt(square);
-  kinks_.clear();
-  all_kinks_ = pressure.kinks({frame_.origin - Vec3::Constant(reach), frame_.origin + Vec3::Constant(reach)}, kinks_);
-  std::erase_if(kinks_, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
+  levels_.kink.clear();
+  levels_.all_kinks = pressure.kinks({frame_.origin - Vec3::Constant(reach), frame_.origin + Vec3::Constant(reach)}, levels_.kink);
+  std::erase_if(levels_.kink, [&](const implicit::Kink& kink) { return std::abs(kink.value(frame_.origin)) > kink.change(frame_.origin, reach); });
 }
 
 /// Those of them that have points of rays to the rim on the other side than the centre; third bodies may all cross.
 void PolarRuleSolver::cross_star(PairPressure& pressure) {
-  crossing_.clear();
-  for (std::size_t k = 0; k < kinks_.size(); ++k) {
-    if (!parts_at(kinks_[k])) continue;
-    const bool side = kinks_[k].value(frame_.origin) > 0.0;
+  levels_.crossing.clear();
+  for (std::size_t k = 0; k < levels_.kink.size(); ++k) {
+    if (!parts_at(levels_.kink[k])) continue;
+    const bool side = levels_.kink[k].value(frame_.origin) > 0.0;
     const auto other = [&](const RimPoint& p) {
       const Vec3 reach = frame_.across(p.at);
       const double linear = rise_.dot(reach);
       for (const double share : {0.25, 0.5, 0.75, 1.0}) {
         const double height = share * linear + share * share * (p.height - linear);
-        if ((kinks_[k].value(frame_.origin + share * reach + height * frame_.axis) > 0.0) != side) return true;
+        if ((levels_.kink[k].value(frame_.origin + share * reach + height * frame_.axis) > 0.0) != side) return true;
       }
       return false;
     };
-    if (std::any_of(outline_.begin(), outline_.end(), other)) crossing_.push_back(k);
+    if (std::any_of(outline_.begin(), outline_.end(), other)) levels_.crossing.push_back(k);
   }
-  for (std::size_t t = 0; t < third_.size(); ++t) crossing_.push_back(kinks_.size() + t);
+  for (std::size_t t = 0; t < levels_.third.size(); ++t) levels_.crossing.push_back(levels_.kink.size() + t);
   find_imprints(pressure);
 }
 
