@@ -23,7 +23,9 @@
 #include "surface/polar/patch_levels.h"
 #include "surface/polar/polar_cover.h"
 #include "surface/polar/polar_job.h"
+#include "surface/polar/ray_crossings.h"
 #include "surface/polar/rim_corners.h"
+#include "surface/polar/rim_waves.h"
 #include "surface/quadrature.h"
 #include "surface/region/polar_columns.h"
 
@@ -54,12 +56,6 @@ class PolarRuleSolver {
   void cover(PolarCover& out) const;                                      ///< of the last solve
 
  private:
-  /// Directions from the peak, and where the rim is met on them.
-  struct Rays {
-    std::vector<double> cosine, sine, radius, height;  // (cosine, sine): about the middle, of any length
-    std::vector<Vec2> outward;                         // the pressure falls, in units of u and v
-    [[nodiscard]] std::size_t size() const noexcept { return cosine.size(); }
-  };
   struct AboutPeak {
     bool round = false;
     bool any = false;  ///< whatever the error, and without regard to kinks of the fields; else other rules are tried after this one
@@ -107,12 +103,6 @@ class PolarRuleSolver {
     /// angle from where it touches it: as a polynomial, when the angle grows as a square.
     [[nodiscard]] std::array<double, 2> bend(double x) const;
   };
-  struct Crossing {
-    std::size_t ray, kink;
-    double radius, height;  // radius over that of the rim
-    double left, right;     // it lies between these
-    bool good;
-  };
   bool no_kinks_near(PairPressure& pressure);
   void find_kinks(PairPressure& pressure);
   bool kinks_cross(PairPressure& pressure);
@@ -129,24 +119,10 @@ class PolarRuleSolver {
   };
   std::vector<Turn> find_turns(PairPressure& pressure);
   bool solve_split(PairPressure& pressure, const ContactSettings& settings);
-  void follow_rim();
-  [[nodiscard]] std::array<double, 2> rim_at(double cosine, double sine) const;
-  template <class Directions>
-  std::array<Directions, 2> sum_waves(const Directions& cosine, const Directions& sine) const;
-  /// A kink along a ray: s = value + share (along + square share + mixed rise) + rise (up + up_square rise) of those that tell.
-  struct RaySheet {
-    std::size_t ray, kink;
-    Vec3 reach;  // from the origin to the rim [m]
-    bool told;
-    double value, along, up, square, mixed, up_square;
-  };
-  [[nodiscard]] RaySheet sheet_along(std::size_t ray, std::size_t c, const Vec3& reach) const;
-  double side_on_ray(PairPressure& pressure, const RaySheet& on, double share, double rise);
-  void cross_between(PairPressure& pressure, const RaySheet& on, Interval where, Interval sides, std::size_t others);
-  void sample_thirds(PairPressure& pressure);
-  void guess_crossings(PairPressure& pressure);
-  void find_crossings(PairPressure& pressure, double error);
-  bool cross_imprints(PairPressure& pressure, std::size_t ray, std::size_t kink, std::span<const double> s);
+  void follow_rim() {
+    waves_.fit(rim_);
+    waves_.place(frame_, fine_rim_);
+  }
   void find_changes(PairPressure& pressure, const KronrodRule& rule, std::size_t first);
   bool add_missed_kinks();
   bool find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first);
@@ -165,7 +141,6 @@ class PolarRuleSolver {
   [[nodiscard]] bool parts_at_changes(const Panel& panel, const Finer& how) const { return how.part && panel.change < panel.change_end && !(about_middle_ && cut_); }
   void refine_panel(const Panel& panel, const Finer& how, bool halve, std::vector<Panel>& finer);
   void gather_panels();
-  [[nodiscard]] double model_height(std::size_t ray, double share) const;
 
   // About the middle: middle_rule.cpp.
   bool solve_about_middle(const PolarJob& job, const PeakFrame& frame, PatchPoints& points);
@@ -198,7 +173,7 @@ class PolarRuleSolver {
   Rays rim_;
   std::vector<double> coarse_radius_, coarse_height_;
   std::vector<double> low_, high_;
-  PressureBatch rim_batch_, crossing_batch_, node_;
+  PressureBatch rim_batch_, node_;
   PressureBatch some_;              // points of one of these at which Newton's method has not ended
   std::vector<std::size_t> open_;   // which they are
   std::vector<double> height_, weight_, area_, pressure_;
@@ -222,13 +197,11 @@ class PolarRuleSolver {
   std::uint32_t parted_ = 0;
   Box smooth_;                         // no kink is in it
   std::vector<Panel> panels_;
-  struct Wave {
-    Eigen::ArrayXd cosine, sine;
-  };
-  std::array<Wave, 2> wave_;  // Fourier coefficients of the rim's radius and height
+  RimWaves waves_;
   std::vector<Vec3> fine_rim_;
   Rays rays_;
-  std::vector<double> linear_, square_, rest_;  // heights along a ray: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest)
+  RayHeights heights_;
+  RayCrossings ray_crossings_;
   std::vector<Crossing> crossings_;
   std::vector<std::size_t> first_crossing_;  // of a ray, and their number
   std::vector<double> changes_;  // places where within a panel rays begin to meet other kinks, or in another order
@@ -237,7 +210,6 @@ class PolarRuleSolver {
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis; 0 elsewhere
   std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;
-  std::vector<Sheet> sheets_;
   std::vector<std::size_t> ray_nodes_, ray_check_;  // first node of a ray, and of those to compare with
   /// Columns of kept nodes, each with that of the nodes at hand.
   template <class Body>

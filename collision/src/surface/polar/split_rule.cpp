@@ -57,7 +57,7 @@ double share_of_difference(const PatchSums& a, const PatchSums& b, const PatchSu
 bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule, double error, std::size_t first) {
   const std::size_t per_panel = rule.node.size();
   const std::size_t count = (panels_.size() - first) * per_panel;
-  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &linear_, &square_, &rest_}) {
+  for (std::vector<double>* column : {&rays_.cosine, &rays_.sine, &rays_.radius, &rays_.height, &turn_, &heights_.linear, &heights_.square, &heights_.rest}) {
     column->resize(count);
   }
   if (about_middle_) {
@@ -71,7 +71,7 @@ bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule,
       const auto [s, c] = math::sin_cos(angle);
       rays_.cosine[i] = c;
       rays_.sine[i] = s;
-      const auto [radius, height] = about_star_ ? outline_at(c, s) : rim_at(c, s);
+      const auto [radius, height] = about_star_ ? outline_at(c, s) : waves_.at(c, s);
       rays_.radius[i] = radius;
       rays_.height[i] = height;
       if (!(radius > 0.0)) return false;
@@ -117,7 +117,7 @@ void PolarRuleSolver::lay_nodes(const KronrodRule& rule, std::size_t ray, int no
   double left = 0.0, lift_left = 0.0;
   for (std::size_t c = begin; c <= end; ++c) {
     const double right = c < end ? crossings_[c].radius : 1.0;
-    const double lift_right = c < end ? crossings_[c].height - model_height(ray, right) : 0.0;
+    const double lift_right = c < end ? crossings_[c].height - heights_.at(ray, right) : 0.0;
     if (c < end && (right - left < shortest || 1.0 - right < shortest)) continue;
     // On faces it is the short last piece on which the pressure falls.
     const int all = about_middle_ ? nodes : nodes_on(nodes, piece_share(rule, ray, c - begin, right - left));
@@ -125,7 +125,7 @@ void PolarRuleSolver::lay_nodes(const KronrodRule& rule, std::size_t ray, int no
     for (std::size_t j = 0; j < gauss.node.size(); ++j) {
       const double along = gauss.node[j], r = left + (right - left) * along;
       foot_.push_back(frame_.origin + (r * rim) * e);
-      height_.push_back(model_height(ray, r) + lift_left + along * (lift_right - lift_left));
+      height_.push_back(heights_.at(ray, r) + lift_left + along * (lift_right - lift_left));
       weight_.push_back(angle * turn_[ray] * gauss.weight[j] * (right - left) * rim * rim * r * jacobian_);
     }
     left = right;
@@ -138,13 +138,14 @@ bool PolarRuleSolver::solve_panels(PairPressure& pressure, const KronrodRule& ru
   const std::size_t per_panel = rule.node.size(), count = rays_.size();
   for (std::size_t i = 0; i < count; ++i) {
     const double c = rays_.cosine[i], s = rays_.sine[i], rim = rays_.radius[i];
-    linear_[i] = rim * rise_.dot(direction(c, s));
+    heights_.linear[i] = rim * rise_.dot(direction(c, s));
     // Faces are flat about the middle.
-    square_[i] = about_middle_ ? 0.0
+    heights_.square[i] = about_middle_ ? 0.0
                                : 0.5 * rim * rim * (frame_.height_uu * c * c + 2.0 * frame_.height_uv * c * s + frame_.height_vv * s * s);
-    rest_[i] = rays_.height[i] - linear_[i] - square_[i];
+    heights_.rest[i] = rays_.height[i] - heights_.linear[i] - heights_.square[i];
   }
-  find_crossings(pressure, error);
+  heights_.star = about_star_;
+  crossings_.swap(ray_crossings_.find({pressure, frame_, levels_, rays_, heights_, finder_, about_middle_}, error));
   find_changes(pressure, rule, first);
   const double shortest = shortest_piece(error, about_middle_);
   std::erase_if(crossings_, [&](const Crossing& x) { return x.radius < shortest || x.radius > 1.0 - shortest; });
