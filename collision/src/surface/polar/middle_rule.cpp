@@ -13,18 +13,6 @@
 namespace supple::collision {
 namespace {
 
-constexpr double kRough = 0.05, kFine = 1e-2;  // of the radius, to find the middle and the corners
-constexpr double kClear = 0.1;             // of the radius, from kinks to the middle
-
-std::vector<Vec2> circle(std::size_t n) {
-  std::vector<Vec2> ways;
-  for (std::size_t k = 0; k < n; ++k) {
-    const auto [s, c] = math::sin_cos(kTurn * static_cast<double>(k) / static_cast<double>(n));
-    ways.emplace_back(c, s);
-  }
-  return ways;
-}
-
 /// Where the tangents at two points of the rim meet; nothing where that is not between the rays through them.
 std::optional<Vec2> between_tangents(const Vec2& a, const Vec2& out_a, const Vec2& b, const Vec2& out_b) {
   const double turn = cross(out_a, out_b);
@@ -43,73 +31,12 @@ bool PolarRuleSolver::follow_rays(PairPressure& pressure) {
   std::vector<RimPoint> found;
   for (std::size_t i = 0; i < rays_.size(); ++i) ways.emplace_back(rays_.cosine[i], rays_.sine[i]);
   OutlineWalks walks(pressure, frame_, levels_.kink, extent_);
-  if (!walks.follow(ways, kFine, found)) return false;
+  if (!walks.follow(ways, kOutlineStep, found)) return false;
   for (std::size_t i = 0; i < found.size(); ++i) {
     rays_.radius[i] = walks.length(i);
     rays_.height[i] = found[i].height;
   }
   return true;
-}
-
-/// The frame's origin goes along the axis to Sigma, in `rim_batch_`, too. @return whether both press there
-bool PolarRuleSolver::lift_to_sigma(PairPressure& pressure) {
-  PressureBatch& batch = rim_batch_;
-  batch.resize(1);
-  for (int step = 0; step < kFreeSteps; ++step) {
-    batch.point[0] = frame_.origin;
-    pressure.evaluate(batch);
-    const double rate = (batch.slope_b[0] - batch.slope_a[0]).dot(frame_.axis);
-    if (!(rate > 0.0)) return false;
-    const double lift = (batch.a[0] - batch.b[0]) / rate;
-    frame_.origin += lift * frame_.axis;
-    if (std::abs(lift) <= 1e-9 * frame_.thickness) break;
-  }
-  return std::min(batch.a[0], batch.b[0]) > 0.0;
-}
-
-/// The frame goes to the centroid of the outline, with axes in which the outline is as wide as it is long.
-bool PolarRuleSolver::move_to_middle(PairPressure& pressure) {
-  const double lu = frame_.u.norm(), lv = frame_.v.norm();
-  PolygonMoments moments;
-  for (std::size_t k = 0; k < outline_.size(); ++k) {
-    const Vec2 &a = outline_[k].at, &b = outline_[(k + 1) % outline_.size()].at;
-    const Vec2 p(lu * a.x(), lv * a.y()), q(lu * b.x(), lv * b.y());
-    if (!(cross(p, q) > 0.0)) return false;
-    moments.add_edge(p, q);
-  }
-  const Vec2 centre = moments.first / moments.area;
-  const Eigen::Matrix2d second = moments.second / moments.area - centre * centre.transpose();
-  const Principal axes = principal(second(0, 0), second(0, 1), second(1, 1));
-  if (!(axes.second > 0.0)) return false;
-  const Vec3 along = frame_.u / lu, across = frame_.v / lv;
-  frame_.origin += centre.x() * along + centre.y() * across;
-  if (!lift_to_sigma(pressure)) return false;
-  // An ellipse has a quarter of the squares of its half axes as its second moments.
-  frame_.axis = (rim_batch_.slope_b[0] - rim_batch_.slope_a[0]).normalized();
-  const Vec3 u = axes.cosine * along + axes.sine * across, v = axes.cosine * across - axes.sine * along;
-  const Vec3 one = (u - u.dot(frame_.axis) * frame_.axis).normalized();
-  frame_.u = 2.0 * std::sqrt(axes.first) * one;
-  frame_.v = 2.0 * std::sqrt(axes.second) * (v - v.dot(frame_.axis) * frame_.axis - v.dot(one) * one).normalized();
-  return true;
-}
-
-/// Where a kink passes close to the middle, its crossings of rays nearly along it go from there to the rim within so small an angle that rules
-/// agree without having seen it: the middle keeps away.
-bool PolarRuleSolver::move_off_kinks(PairPressure& pressure) {
-  double least = kClear;
-  Vec2 away = Vec2::Zero();
-  for (const implicit::Kink& kink : levels_.kink) {
-    Vec3 slope;
-    const double value = kink.value(frame_.origin, slope);
-    const Vec2 rise(slope.dot(frame_.u), slope.dot(frame_.v));
-    const double distance = std::abs(value) / rise.norm();
-    if (!(distance < least)) continue;
-    least = distance;
-    away = std::copysign(kClear - distance, value) / rise.norm() * rise;
-  }
-  if (least == kClear) return true;
-  frame_.origin += frame_.across(away);
-  return lift_to_sigma(pressure);
 }
 
 /// Which kinks have points of the outline on the other side than the middle; third bodies may all cross.
@@ -183,20 +110,14 @@ bool PolarRuleSolver::solve_about_middle(const PolarJob& job, const PeakFrame& f
 }
 
 bool PolarRuleSolver::part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings) {
-  frame_ = frame;
-  static const std::vector<Vec2> few = circle(kFewRays), many = circle(kManyRays);
   levels_.kink.clear();
   // All of both bodies: which of them a box holds depends on how it lies.
   levels_.all_kinks = pressure.kinks({Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)}, levels_.kink);
   if (levels_.kink.empty()) return false;
-  frame_.u *= std::sqrt(2.0 * frame_.peak);
-  frame_.v *= std::sqrt(2.0 * frame_.peak);
-  for (const int round : {0, 1, 2}) {
-    outline_.clear();
-    if (!OutlineWalks(pressure, frame_, levels_.kink, extent_).follow(round < 2 ? few : many, round < 2 ? kRough : kFine, outline_)) return false;
-    if (round < 2 && !move_to_middle(pressure)) return false;
-    if (round == 1 && !move_off_kinks(pressure)) return false;
-  }
+  std::optional<Middle> middle = find_middle(pressure, frame, levels_.kink, extent_);
+  if (!middle) return false;
+  frame_ = middle->frame;
+  outline_ = std::move(middle->outline);
   jacobian_ = frame_.u.norm() * frame_.v.norm();
   cross_outline();
   find_imprints(pressure);

@@ -16,6 +16,8 @@ constexpr double kNear = 0.3;          // pressure at the rim, of that in the mi
 constexpr double kFar = 2.0;           // from Sigma, in the overlap: Newton's method is not believed
 constexpr double kWidest = 1.7;        // sector [rad] in units of u and v
 constexpr double kSameCorner = 1e-6;
+constexpr double kRough = 0.05;        // last step of walks, over the distance gone, where they only find the middle
+constexpr double kClear = 0.1;         // of the radius, from kinks to the middle
 
 /// A place of the outline where a sector may begin.
 struct Mark {
@@ -242,6 +244,97 @@ bool make_sectors(const Outline& outline, std::vector<Sector>& sectors, std::vec
   return std::all_of(sectors.begin(), sectors.end(), [](const Sector& sector) {
     return cross(sector.at[0], sector.at[1]) > 0.0 && cross(sector.at[1], sector.at[2]) > 0.0;
   });
+}
+
+namespace {
+
+std::vector<Vec2> circle(std::size_t n) {
+  std::vector<Vec2> ways;
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto [s, c] = math::sin_cos(kTurn * static_cast<double>(k) / static_cast<double>(n));
+    ways.emplace_back(c, s);
+  }
+  return ways;
+}
+
+/// The frame's origin goes along the axis to Sigma, in the batch, too. @return whether both press there
+bool lift_to_sigma(PairPressure& pressure, PeakFrame& frame, PressureBatch& batch) {
+  batch.resize(1);
+  for (int step = 0; step < kFreeSteps; ++step) {
+    batch.point[0] = frame.origin;
+    pressure.evaluate(batch);
+    const double rate = (batch.slope_b[0] - batch.slope_a[0]).dot(frame.axis);
+    if (!(rate > 0.0)) return false;
+    const double lift = (batch.a[0] - batch.b[0]) / rate;
+    frame.origin += lift * frame.axis;
+    if (std::abs(lift) <= 1e-9 * frame.thickness) break;
+  }
+  return std::min(batch.a[0], batch.b[0]) > 0.0;
+}
+
+/// The frame goes to the centroid of the outline, with axes in which the outline is as wide as it is long.
+bool move_to_middle(PairPressure& pressure, std::span<const RimPoint> outline, PeakFrame& frame) {
+  const double lu = frame.u.norm(), lv = frame.v.norm();
+  PolygonMoments moments;
+  for (std::size_t k = 0; k < outline.size(); ++k) {
+    const Vec2 &a = outline[k].at, &b = outline[(k + 1) % outline.size()].at;
+    const Vec2 p(lu * a.x(), lv * a.y()), q(lu * b.x(), lv * b.y());
+    if (!(cross(p, q) > 0.0)) return false;
+    moments.add_edge(p, q);
+  }
+  const Vec2 centre = moments.first / moments.area;
+  const Eigen::Matrix2d second = moments.second / moments.area - centre * centre.transpose();
+  const Principal axes = principal(second(0, 0), second(0, 1), second(1, 1));
+  if (!(axes.second > 0.0)) return false;
+  const Vec3 along = frame.u / lu, across = frame.v / lv;
+  frame.origin += centre.x() * along + centre.y() * across;
+  PressureBatch batch;
+  if (!lift_to_sigma(pressure, frame, batch)) return false;
+  // An ellipse has a quarter of the squares of its half axes as its second moments.
+  frame.axis = (batch.slope_b[0] - batch.slope_a[0]).normalized();
+  const Vec3 u = axes.cosine * along + axes.sine * across, v = axes.cosine * across - axes.sine * along;
+  const Vec3 one = (u - u.dot(frame.axis) * frame.axis).normalized();
+  frame.u = 2.0 * std::sqrt(axes.first) * one;
+  frame.v = 2.0 * std::sqrt(axes.second) * (v - v.dot(frame.axis) * frame.axis - v.dot(one) * one).normalized();
+  return true;
+}
+
+/// Where a kink passes close to the middle, its crossings of rays nearly along it go from there to the rim within so small an angle that rules
+/// agree without having seen it: the middle keeps away.
+bool move_off_kinks(PairPressure& pressure, std::span<const implicit::Kink> kinks, PeakFrame& frame) {
+  double least = kClear;
+  Vec2 away = Vec2::Zero();
+  for (const implicit::Kink& kink : kinks) {
+    Vec3 slope;
+    const double value = kink.value(frame.origin, slope);
+    const Vec2 rise(slope.dot(frame.u), slope.dot(frame.v));
+    const double distance = std::abs(value) / rise.norm();
+    if (!(distance < least)) continue;
+    least = distance;
+    away = std::copysign(kClear - distance, value) / rise.norm() * rise;
+  }
+  if (least == kClear) return true;
+  frame.origin += frame.across(away);
+  PressureBatch batch;
+  return lift_to_sigma(pressure, frame, batch);
+}
+
+}  // namespace
+
+std::optional<Middle> find_middle(PairPressure& pressure, const PeakFrame& inside, std::span<const implicit::Kink> kinks, double extent) {
+  static const std::vector<Vec2> few = circle(kFewRays), many = circle(kManyRays);
+  Middle middle;
+  PeakFrame& frame = middle.frame;
+  frame = inside;
+  frame.u *= std::sqrt(2.0 * frame.peak);
+  frame.v *= std::sqrt(2.0 * frame.peak);
+  for (const int round : {0, 1, 2}) {
+    middle.outline.clear();
+    if (!OutlineWalks(pressure, frame, kinks, extent).follow(round < 2 ? few : many, round < 2 ? kRough : kOutlineStep, middle.outline)) return std::nullopt;
+    if (round < 2 && !move_to_middle(pressure, middle.outline, frame)) return std::nullopt;
+    if (round == 1 && !move_off_kinks(pressure, kinks, frame)) return std::nullopt;
+  }
+  return middle;
 }
 
 }  // namespace supple::collision

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,6 +28,9 @@ struct Sheet {
   bool flat = false, told = false;
 };
 [[nodiscard]] Sheet sheet_of(const implicit::Kink& kink, const Vec3& origin);
+
+/// Last step of walks to where corners of the outline are sought, over the distance gone.
+inline constexpr double kOutlineStep = 1e-2;
 
 /// Rays from the middle to the rim. Between kinks the pressure along a ray is smooth: what is known of it inside, or beyond the
 /// rim, says where to look next, and never beyond the next kink before that has been looked at.
@@ -70,6 +74,15 @@ class OutlineWalks {
   std::vector<Walk> walks_;
   PressureBatch batch_;
 };
+
+/// A patch of faces about its middle.
+struct Middle {
+  PeakFrame frame;  ///< about the centroid of the outline, which is as wide as it is long in units of u and v, but not on a kink
+  std::vector<RimPoint> outline;
+};
+
+/// @param inside  of any place of the patch   @return nothing where the rim is not found
+[[nodiscard]] std::optional<Middle> find_middle(PairPressure& pressure, const PeakFrame& inside, std::span<const implicit::Kink> kinks, double extent);
 
 /// Directions of rays as a parabola through three points near the rim, with heights.
 struct Sector {

@@ -24,6 +24,7 @@
 #include "surface/polar/polar_cover.h"
 #include "surface/polar/polar_job.h"
 #include "surface/polar/ray_crossings.h"
+#include "surface/polar/rim_curve.h"
 #include "surface/polar/rim_corners.h"
 #include "surface/polar/rim_waves.h"
 #include "surface/quadrature.h"
@@ -146,9 +147,6 @@ class PolarRuleSolver {
   bool solve_about_middle(const PolarJob& job, const PeakFrame& frame, PatchPoints& points);
   bool part_about_middle(PairPressure& pressure, const PeakFrame& frame, const ContactSettings& settings);
   bool follow_rays(PairPressure& pressure);
-  bool lift_to_sigma(PairPressure& pressure);
-  bool move_to_middle(PairPressure& pressure);
-  bool move_off_kinks(PairPressure& pressure);
   void follow_tangents();
   void start_sectors(int nodes);
   void cross_outline();
@@ -157,11 +155,8 @@ class PolarRuleSolver {
 
   // About a point that sees the whole rim: star_rule.cpp.
   bool solve_about_star(const PolarJob& job, const PeakFrame& frame, bool fine, PatchPoints& points);
-  bool move_to_star(PairPressure& pressure);
-  void bend_at_star(PairPressure& pressure, double rate);
   void find_star_kinks(PairPressure& pressure);
   void cross_star(PairPressure& pressure);
-  [[nodiscard]] std::array<double, 2> outline_at(double cosine, double sine) const;
 
   PeakFrame frame_;
   PatchColumns columns_;
@@ -207,6 +202,7 @@ class PolarRuleSolver {
   std::vector<double> changes_;  // places where within a panel rays begin to meet other kinks, or in another order
   std::vector<double> turn_;             // what the weight of the angle is multiplied by
   bool about_middle_ = false, about_star_ = false;  // about the middle rays go through `sectors_`
+  Star star_;
   Vec3 rise_ = Vec3::Zero();             // of Sigma at the star's centre, over a step across the axis; 0 elsewhere
   std::vector<RimPoint> outline_, polygon_, kept_rim_, sorted_rim_;  // by angle; of a patch that is parted; by panel
   std::vector<Sector> sectors_;

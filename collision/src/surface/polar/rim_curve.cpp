@@ -1,6 +1,7 @@
 #include "surface/polar/rim_curve.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "surface/accuracy.h"
@@ -140,6 +141,102 @@ std::optional<Vec2> point_that_sees(std::span<const Vec2> polygon) {
     if (!(cross(edge, centre - polygon[i]) > least * edge.norm())) return std::nullopt;
   }
   return centre;
+}
+
+namespace {
+
+/// Second derivatives of Sigma's height at the origin, by differences along its tangents. @param rate  that p_B - p_A rises at, along the axis
+void bend_at(PairPressure& pressure, double rate, Star& star) {
+  PeakFrame& frame = star.frame;
+  constexpr double kStep = 1e-3;  // of the radius
+  const std::array<Vec3, 2> tangent{frame.u + star.rise.dot(frame.u) * frame.axis, frame.v + star.rise.dot(frame.v) * frame.axis};
+  PressureBatch batch;
+  batch.resize(4);
+  for (std::size_t i = 0; i < 4; ++i) batch.point[i] = frame.origin + (i % 2 == 0 ? kStep : -kStep) * tangent[i / 2];
+  pressure.evaluate(batch);
+  const auto second = [&](std::size_t along, std::size_t across) {
+    const std::size_t i = 2 * along;
+    const Vec3 change = (batch.slope_a[i] - batch.slope_b[i]) - (batch.slope_a[i + 1] - batch.slope_b[i + 1]);
+    return change.dot(tangent[across]) / (2.0 * kStep * rate);
+  };
+  frame.height_uu = second(0, 0);
+  frame.height_uv = 0.5 * (second(0, 1) + second(1, 0));
+  frame.height_vv = second(1, 1);
+}
+
+/// The frame of a star goes to a point that sees its rim, with axes in which the rim is as wide as it is long. @return whether there is one
+bool move_to_centre(PairPressure& pressure, Star& star) {
+  PeakFrame& frame = star.frame;
+  const Vec3 along = frame.u.normalized(), across = frame.v.normalized();
+  std::vector<Vec2> polygon;
+  for (const Vec3& x : star.rim) polygon.emplace_back((x - frame.origin).dot(along), (x - frame.origin).dot(across));
+  double area = 0.0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) area += 0.5 * cross(polygon[i], polygon[(i + 1) % polygon.size()]);
+  if (area < 0.0) {
+    std::reverse(polygon.begin(), polygon.end());
+    std::reverse(star.rim.begin(), star.rim.end());
+  }
+  const std::optional<Vec2> centre = point_that_sees(polygon);
+  if (!centre) return false;
+  PolygonMoments moments;
+  for (std::size_t i = 0; i < polygon.size(); ++i) moments.add_edge(polygon[i] - *centre, polygon[(i + 1) % polygon.size()] - *centre);
+  const Eigen::Matrix2d second = moments.second / moments.area;
+  const Principal axes = principal(second(0, 0), second(0, 1), second(1, 1));
+  if (!(axes.second > 0.0)) return false;
+  // From the peak to the centre in short steps on Sigma.
+  Vec3 x = frame.origin;
+  PressureBatch batch;
+  batch.resize(1);
+  const Vec3 way = centre->x() * along + centre->y() * across;
+  const int steps = 1 + static_cast<int>(way.norm() / (kWalk * std::sqrt(axes.second)));
+  if (steps > kWalkSteps) return false;
+  double p = 0.0;
+  for (int step = 0; step < steps + kFreeSteps; ++step) {
+    if (step < steps) x += way / steps;
+    batch.point[0] = x;
+    pressure.evaluate(batch);
+    const Vec3 slope = batch.slope_b[0] - batch.slope_a[0];
+    const double rate = slope.dot(frame.axis);
+    if (!(rate > kGraphCosine * slope.norm())) return false;
+    x += (batch.a[0] - batch.b[0]) / rate * frame.axis;
+    p = std::min(batch.a[0], batch.b[0]);
+  }
+  if (!(p > 0.0)) return false;
+  frame.origin = x;
+  // An ellipse has a quarter of the squares of its half axes as its second moments.
+  frame.u = 2.0 * std::sqrt(axes.first) * (axes.cosine * along + axes.sine * across);
+  frame.v = 2.0 * std::sqrt(axes.second) * (axes.cosine * across - axes.sine * along);
+  const double rate = (batch.slope_b[0] - batch.slope_a[0]).dot(frame.axis);
+  star.rise = (batch.slope_a[0] - batch.slope_b[0]) / rate;
+  bend_at(pressure, rate, star);
+  for (const Vec3& rim : star.rim) {
+    const Vec3 d = rim - frame.origin;
+    star.outline.push_back({frame.parts_of(d), d.dot(frame.axis), Vec2::Zero()});
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<Star> find_star(PairPressure& pressure, const PeakFrame& peak, double extent, bool fine) {
+  Star star;
+  star.frame = peak;
+  if (!RimFollower(pressure, peak, extent).follow(fine, star.rim) || !move_to_centre(pressure, star)) return std::nullopt;
+  return star;
+}
+
+/// Radius and height of the outline in a direction, linear between its points.
+std::array<double, 2> Star::outline_at(double cosine, double sine) const {
+  const Vec2 way(cosine, sine);
+  const std::size_t n = outline.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const RimPoint &a = outline[i], &b = outline[(i + 1) % n];
+    const double beyond = cross(a.at, way), before = cross(way, b.at);
+    if (!(beyond >= 0.0) || !(before >= 0.0) || !(way.dot(a.at + b.at) > 0.0)) continue;
+    const double share = beyond / (beyond + before);
+    return {((1.0 - share) * a.at + share * b.at).norm(), (1.0 - share) * a.height + share * b.height};
+  }
+  return {0.0, 0.0};
 }
 
 }  // namespace supple::collision

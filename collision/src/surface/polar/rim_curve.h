@@ -2,12 +2,14 @@
 /// The rim of a patch, where both pressures vanish, followed as a curve in space; and places that all of it is seen from.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "surface/find_peak.h"
 #include "surface/pair_pressure.h"
+#include "surface/polar/outline.h"
 
 namespace supple::collision {
 
@@ -30,5 +32,18 @@ class RimFollower {
 
 /// The centroid of the kernel of a polygon: of the places that see all of it (Preparata & Shamos 1985, sec. 7.2.6). @return nothing where the kernel is empty
 [[nodiscard]] std::optional<Vec2> point_that_sees(std::span<const Vec2> polygon);
+
+/// A patch as a place sees it that all of its rim is seen from.
+struct Star {
+  PeakFrame frame;         ///< about that place; in units of u and v the rim is as wide as it is long
+  Vec3 rise = Vec3::Zero();  ///< of Sigma there, over a step across the axis
+  std::vector<Vec3> rim;
+  std::vector<RimPoint> outline;  ///< the same, without slopes
+  /// Radius and height of the outline in a direction, linear between its points.
+  [[nodiscard]] std::array<double, 2> outline_at(double cosine, double sine) const;
+};
+
+/// @param fine  the steps along the rim   @return nothing where no place sees the whole rim
+[[nodiscard]] std::optional<Star> find_star(PairPressure& pressure, const PeakFrame& peak, double extent, bool fine);
 
 }  // namespace supple::collision

@@ -71,7 +71,7 @@ bool PolarRuleSolver::find_rays(PairPressure& pressure, const KronrodRule& rule,
       const auto [s, c] = math::sin_cos(angle);
       rays_.cosine[i] = c;
       rays_.sine[i] = s;
-      const auto [radius, height] = about_star_ ? outline_at(c, s) : waves_.at(c, s);
+      const auto [radius, height] = about_star_ ? star_.outline_at(c, s) : waves_.at(c, s);
       rays_.radius[i] = radius;
       rays_.height[i] = height;
       if (!(radius > 0.0)) return false;
