@@ -17,6 +17,8 @@ inline constexpr int kFreeSteps = 8;
 
 /// Least cosine between Sigma's normal and an axis along which Sigma is a graph.
 inline constexpr double kGraphCosine = 0.2;
+/// Least cosine between a ray and the normal of what it is to meet: nearer to grazing, it is not followed.
+inline constexpr double kLeastSight = 0.1;
 /// Pressure over the modulus within which a place lies on a body's surface: a body's own samples do, but for rounding.
 inline constexpr double kOnSurface = 1e-9;
 /// Rays by which the outline of a patch or of an imprint is seen roughly, and well.

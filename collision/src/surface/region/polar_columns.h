@@ -14,9 +14,6 @@
 
 namespace supple::collision {
 
-/// Cosine of a ray to what it is to meet: nearer to grazing, it is not followed.
-inline constexpr double kLeastSight = 0.1;
-
 /// The nodes of a patch on Sigma, where columns begin.
 struct PatchNodes {
   const PeakFrame& frame;
