@@ -76,7 +76,7 @@ TEST(ForcesOfSeveral, LeaveOutWhatAThirdBodyTakesBesideAKink) {
   }
 }
 
-/// Field evaluations of all pairs of a group; none where one is marched, or where no third body takes part.
+/// Field evaluations of all pairs of a group; none where a pair is marched for its force, or where no third body takes part.
 std::optional<double> evaluations_of(std::span<const ContactBody> bodies, bool energy) {
   ContactCandidates candidates;
   ContactSurface surface;
@@ -86,22 +86,22 @@ std::optional<double> evaluations_of(std::span<const ContactBody> bodies, bool e
   if (surface.summary.size() < 2) return std::nullopt;
   double sum = 0.0;
   for (const ContactSurface::Summary& s : surface.summary) {
-    if (s.rule != ContactRule::Polar) return std::nullopt;
+    if (!energy && s.rule != ContactRule::Polar) return std::nullopt;
     sum += static_cast<double>(s.evaluations);
   }
   return sum;
 }
 
-// All pairs of a body share one search for its apex, and panels are not divided where its pressure hardly falls along a column.
+// All pairs of a body share one search for its apex. Panels are not divided where its pressure hardly falls along a column: pairs would be marched for their energy.
 TEST(EnergiesOfSeveral, TakeAFewTimesTheEvaluationsOfForces) {
   int groups = 0;
   for (std::uint64_t seed = 9917; seed < 9943; ++seed) {
     const BodiesInOnePlace place(3, seed);
     const std::vector<ContactBody> bodies = place.bodies();
-    const std::optional<double> forces = evaluations_of(bodies, false), energies = evaluations_of(bodies, true);
-    if (!forces || !energies) continue;
+    const std::optional<double> forces = evaluations_of(bodies, false);
+    if (!forces) continue;
     ++groups;
-    EXPECT_LT(*energies, 8.0 * *forces) << seed;
+    EXPECT_LT(evaluations_of(bodies, true).value(), 8.0 * *forces) << seed;
   }
   EXPECT_GE(groups, 7);
 }
