@@ -144,5 +144,18 @@ TEST(SqueezedRegions, HoldShortPiecesOfColumns) {
   }
 }
 
+/// A corner of the region reaches into a cell between its columns, and between those of its quarters.
+TEST(SqueezedRegions, HoldCornersBetweenColumns) {
+  TimedQuery query;
+  const BodiesInOnePlace place(2, 10125);
+  const std::vector<ContactBody> bodies = place.bodies();
+  const LostVolumes exact = lost_volumes(bodies, kCells), half = lost_volumes(bodies, kCells / 2);
+  for (const double error : {1e-3, 1e-4, 1e-6}) {
+    const double off = std::abs(ContactsOfBodies(bodies.size(), query.ask(bodies, error)).energy - exact.energy);
+    EXPECT_LE(off, 5e-4 * exact.energy) << error;
+    EXPECT_LE(off, sum_of(query.estimate_energies(bodies, error)) + energy_left(exact, half)) << error;
+  }
+}
+
 }  // namespace
 }  // namespace supple::collision
