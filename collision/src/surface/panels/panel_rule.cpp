@@ -76,6 +76,7 @@ class PanelSolver {
   void measure(std::size_t first);
   void look_for_starts(Panel& panel) const;
   void look_for_imprints(Panel& panel) const;
+  void look_for_free_places(Panel& panel) const;
   [[nodiscard]] double estimate();
   [[nodiscard]] double error_of(const Panel& panel) const;
   [[nodiscard]] double energy_scale() const;
@@ -366,6 +367,7 @@ void PanelSolver::measure(std::size_t first) {
   for (const std::uint32_t i : r_.which) {
     Panel& panel = r_.panel[i];
     if (panel.points.size() == 0) look_for_starts(panel);
+    if (panel.points.size() == 0) look_for_free_places(panel);
     if (panel.points.size() > 0) look_for_imprints(panel);
     if (!panel.steep) continue;
     panel.off = panel.sums;
@@ -393,6 +395,19 @@ void PanelSolver::look_for_starts(Panel& panel) const {
   const double area = across * along / (setting_.order * setting_.order);  // what a node stands for
   panel.missed_area = std::max(panel.missed_area, area);
   panel.missed_load = std::max(panel.missed_load, most * area / 3.0);
+}
+
+/// A panel of a star without points that holds a place where the pair presses harder than third bodies misses something.
+void PanelSolver::look_for_free_places(Panel& panel) const {
+  for (const FreePlace& free : job_.free) {
+    const Vec3 y = setting_.view.frame.local(free.at);
+    const PlaneChart::Place place = setting_.chart.place_of({y[0], y[1]});
+    const auto within = [&](std::size_t k, double at) { return at >= panel.low[k] && at <= panel.high[k]; };
+    if (!within(0, place[0]) || !within(1, place[1]) || !within(2, y[2]) || !(free.normal.dot(setting_.view.frame.axis[2]) > 0.0)) continue;
+    const double area = (panel.high[0] - panel.low[0]) * (panel.high[1] - panel.low[1]) * setting_.chart.stretch(place) / (setting_.order * setting_.order);  // what a node stands for
+    panel.missed_area = std::max(panel.missed_area, area);
+    panel.missed_load = std::max(panel.missed_load, area * free.pressure);
+  }
 }
 
 /// A panel that holds a place where a third body presses harder, which none of its lines tells, has too much by what lies between nodes.
