@@ -210,10 +210,16 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   const bool star = stars_cut(job, std::max(error, kFinestPanels), out), coarse = error >= kFinestPanels;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
   if (star && coarse && !small && (out.points.point.empty() || meets(out, error))) return true;
-  if (star && coarse && (apex_[0] || apex_[1])) return false;  // what flows out of these is held to the error by stars alone
+  const bool flows = star && coarse && (apex_[0] || apex_[1]);  // what flows out of these is held to the error by stars alone
+  if (flows && !meets(out, error)) return false;
   std::swap(kept_, out);
   out.summary.bodies = job.pair;
   if (!imprints_cut(job, out)) return false;
+  if (flows) {
+    kept_.summary.error_estimate = std::max(kept_.summary.error_estimate, difference_of(kept_, out));
+    std::swap(kept_, out);
+    return meets(out, error);
+  }
   if (!star || small) return true;
   const double off = difference_of(kept_, out);
   if (coarse) out.summary.error_estimate = std::max(out.summary.error_estimate, off);

@@ -12,6 +12,9 @@
 namespace supple::collision {
 namespace {
 
+/// Share of what two orders of a flux differ by: the finer one is off by less, and energies have estimates of their own.
+constexpr double kOfFlux = 0.25;
+
 constexpr std::size_t kMostPanels = 4096, kMostOfStar = 512;
 constexpr int kMostDepth = 24;
 
@@ -435,7 +438,7 @@ double PanelSolver::error_of(const Panel& panel) const {
   if (!(all_.load > 0.0) || !(all_.area > 0.0)) return panel.missed_load > 0.0 ? 1.0 : 0.0;
   const Vec3 first = panel.off.first - panel.off.load * all_.centre();
   return std::max({(panel.off.force.norm() + panel.missed_load) / force_scale(all_.force, all_.load), (std::abs(panel.off.area) + panel.missed_area) / all_.area,
-                   first.norm() / (all_.load * std::sqrt(all_.area)), std::abs(panel.off.flux[0] + panel.off.flux[1]) / energy_});
+                   first.norm() / (all_.load * std::sqrt(all_.area)), kOfFlux * std::abs(panel.off.flux[0] + panel.off.flux[1]) / energy_});
 }
 
 /// What two orders differ by over all panels, and what is left where their differences cancel by chance: the root of the sum of squares.
@@ -465,7 +468,7 @@ double PanelSolver::estimate() {
   const double force = (e.force.norm() + std::sqrt(e.force_square) + e.missed_load) / force_scale(all_.force, all_.load);
   const double area = (std::abs(e.area) + std::sqrt(e.area_square) + e.missed_area) / all_.area;
   const double first = (e.first.norm() + std::sqrt(e.first_square)) / (all_.load * std::sqrt(all_.area));
-  const double energy = (std::abs(e.energy) + std::sqrt(e.energy_square)) / energy_;
+  const double energy = kOfFlux * (std::abs(e.energy) + std::sqrt(e.energy_square)) / energy_;
   return kTwoOrders * std::max({force, area, first, energy});
 }
 
