@@ -87,6 +87,9 @@ TEST(ForcesOfSeveral, HoldWhatThirdBodiesLeaveOfAPatch) {
   expect_forces_within_estimates(4, 320094);
 }
 
+// Rays of a star lead to another sheet of Sigma, which does not press, and so do those beside them.
+TEST(ForcesOfSeveral, HoldWhatRaysLoseToAnotherSheet) { expect_forces_within_estimates(3, 350099); }
+
 /// Field evaluations of all pairs of a group; none where a pair is marched for its force, or where no third body takes part.
 std::optional<double> evaluations_of(std::span<const ContactBody> bodies, bool energy) {
   ContactCandidates candidates;

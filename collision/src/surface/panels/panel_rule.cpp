@@ -188,6 +188,15 @@ bool PanelSolver::set_star(double margin) {
   set_enough(std::max(cover.thickness, frame.thickness));
   r_.start.clear();
   r_.start_pressure.clear();
+  r_.free.clear();
+  r_.free_pressure.clear();
+  for (const FreePlace& free : job_.free) {
+    if (!(free.normal.dot(frame.axis) > 0.0)) continue;
+    const Vec3 y = setting_.view.frame.local(free.at);
+    const PlaneChart::Place place = setting_.chart.place_of({y[0], y[1]});
+    r_.free.emplace_back(place[0], place[1], y[2]);
+    r_.free_pressure.push_back(free.pressure);
+  }
   return true;
 }
 
@@ -370,7 +379,7 @@ void PanelSolver::measure(std::size_t first) {
   for (const std::uint32_t i : r_.which) {
     Panel& panel = r_.panel[i];
     if (panel.points.size() == 0) look_for_starts(panel);
-    if (panel.points.size() == 0) look_for_free_places(panel);
+    if (panel.points.size() == 0 && job_.star != nullptr) look_for_free_places(panel);
     if (panel.points.size() > 0) look_for_imprints(panel);
     if (!panel.steep) continue;
     panel.off = panel.sums;
@@ -400,16 +409,24 @@ void PanelSolver::look_for_starts(Panel& panel) const {
   panel.missed_load = std::max(panel.missed_load, most * area / 3.0);
 }
 
-/// A panel of a star without points that holds a place where the pair presses harder than third bodies misses something.
+/// A panel of a star without points that holds a place where the pair presses harder than third bodies misses something. Where none of its rays leads to such a place, these
+/// have met another sheet of Sigma.
 void PanelSolver::look_for_free_places(Panel& panel) const {
-  for (const FreePlace& free : job_.free) {
-    const Vec3 y = setting_.view.frame.local(free.at);
-    const PlaneChart::Place place = setting_.chart.place_of({y[0], y[1]});
-    const auto within = [&](std::size_t k, double at) { return at >= panel.low[k] && at <= panel.high[k]; };
-    if (!within(0, place[0]) || !within(1, place[1]) || !within(2, y[2]) || !(free.normal.dot(setting_.view.frame.axis[2]) > 0.0)) continue;
-    const double area = (panel.high[0] - panel.low[0]) * (panel.high[1] - panel.low[1]) * setting_.chart.stretch(place) / (setting_.order * setting_.order);  // what a node stands for
+  constexpr double kEnds = 10.0;  // of steps that are enough: how far off heights may be
+  const std::span<const SigmaRay> nodes = std::span(r_.arena.node).subspan(panel.nodes.begin, panel.nodes.size());
+  for (std::size_t i = 0; i < r_.free.size(); ++i) {
+    const Vec3& free = r_.free[i];
+    const auto within = [&](std::size_t k) { return free[static_cast<Eigen::Index>(k)] >= panel.low[k] && free[static_cast<Eigen::Index>(k)] <= panel.high[k]; };
+    if (!within(0) || !within(1) || !within(2)) continue;
+    const PlaneChart::Place at = setting_.chart.at({free[0], free[1]});
+    const auto leads_there = [&](const SigmaRay& ray) {
+      const double off = std::hypot(ray.at[0] - at[0], ray.at[1] - at[1]);
+      return ray.found && std::abs(ray.height - free[2]) <= off / kRayCosine + kEnds * setting_.enough;
+    };
+    panel.steep = panel.steep || std::none_of(nodes.begin(), nodes.end(), leads_there);
+    const double area = (panel.high[0] - panel.low[0]) * (panel.high[1] - panel.low[1]) * setting_.chart.stretch({free[0], free[1]}) / (setting_.order * setting_.order);  // what a node stands for
     panel.missed_area = std::max(panel.missed_area, area);
-    panel.missed_load = std::max(panel.missed_load, area * free.pressure);
+    panel.missed_load = std::max(panel.missed_load, area * r_.free_pressure[i]);
   }
 }
 

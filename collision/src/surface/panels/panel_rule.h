@@ -59,6 +59,8 @@ struct PanelRoom {
   std::vector<implicit::Kink> kink;
   std::vector<Vec3> start, normal;     // places that press, in the frame of the rays; normals there
   std::vector<double> start_pressure;  // about that of Sigma near these [Pa]
+  std::vector<Vec3> free;              // angles, shares and heights of places that the pair presses hardest on,
+  std::vector<double> free_pressure;   // and how hard [Pa]
   /// Out of a body, from a place of Sigma, and between which lengths the body ends.
   struct Way {
     Vec3 from;
