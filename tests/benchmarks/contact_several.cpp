@@ -1,12 +1,14 @@
 /// @file contact_several.cpp
 /// Contact queries of two to four bodies in one place, drawn at random; one JSON object per number of bodies and given error. Forces and energies are compared
-/// with sums over the volumes that the bodies lose, forces with differences of the energy, and times with those of the same pairs without third bodies.
+/// with sums over columns through the volumes that the bodies lose, forces with differences of the energy, and times with those of the same pairs without third
+/// bodies. Groups are named by the seeds that draw them.
 ///   contact_several [GROUPS] [SEED]
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <limits>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "programs.h"
@@ -19,8 +21,7 @@ namespace {
 using namespace supple;
 using namespace supple::benchmarks;
 
-constexpr int kCells = 96;
-constexpr double kOfCells = 6e-3;  // of the largest load: what sums over that many cells leave
+constexpr int kColumns = 192;
 constexpr double kFineError = 1e-4, kStep = 2e-3;  // of the differences of the energy [m]
 
 /// Of all pairs, each without the other bodies.
@@ -55,31 +56,25 @@ double off_energy(BodiesInOnePlace& place, const LostVolumes& exact, TimedQuery&
 }
 
 struct Figures {
-  int beyond_estimate = 0, unmet = 0, energies_off = 0, energies_beyond_estimate = 0;
-  double largest_over_estimate = 0.0, largest_energy = 0.0, energy_over_estimate = 0.0;
-  int worst_force = -1, worst_energy = -1;  // groups
+  int unmet = 0;
+  double largest_over_estimate = 0.0, energy_over_estimate = 0.0;
+  std::vector<std::uint64_t> beyond_estimate, energies_off, energies_beyond_estimate;  // groups
   std::vector<double> cpu_us, over_alone, energy_estimate;  // the last over the energy
 
-  void add(int group, const ContactsOfBodies& found, const LostVolumes& exact, const LostVolumes& rough, double error) {
+  void add(std::uint64_t group, const ContactsOfBodies& found, const LostVolumes& exact, const LostVolumes& rough, double error) {
     unmet += found.largest_estimate > 1.01 * error ? 1 : 0;
     bool beyond = false;
-    const double largest_load = *std::max_element(exact.load.begin(), exact.load.end());
     for (std::size_t b = 0; b < found.force.size(); ++b) {
-      const double left = kOfCells * largest_load + (exact.force[b] - rough.force[b]).norm(), off = (found.force[b] - exact.force[b]).norm() - left;
+      const double off = (found.force[b] - exact.force[b]).norm() - force_left(exact, rough, b);
       beyond = beyond || off > found.off[b];
-      const double over = off > 0.0 ? off / std::max(found.off[b], std::numeric_limits<double>::min()) : 0.0;
-      if (over > largest_over_estimate) worst_force = group;
-      largest_over_estimate = std::max(largest_over_estimate, over);
+      largest_over_estimate = std::max(largest_over_estimate, off / std::max(found.off[b], std::numeric_limits<double>::min()));
     }
-    beyond_estimate += beyond ? 1 : 0;
-    const double energy = exact.energy > 0.0 ? std::abs(found.energy / exact.energy - 1.0) : 0.0;
-    if (energy > largest_energy) worst_energy = group;
-    largest_energy = std::max(largest_energy, energy);
-    energies_off += energy > error + kOfCells ? 1 : 0;
+    if (beyond) beyond_estimate.push_back(group);
+    if (std::abs(found.energy - exact.energy) > error * exact.energy + energy_left(exact, rough)) energies_off.push_back(group);
   }
-  /// @param off  of the energy of all pairs, less what sums over cells leave   @param estimate  of that [J]
-  void add_estimate(double off, double estimate, double energy) {
-    energies_beyond_estimate += off > estimate ? 1 : 0;
+  /// @param off  of the energy of all pairs, less what columns leave   @param estimate  of that [J]
+  void add_estimate(std::uint64_t group, double off, double estimate, double energy) {
+    if (off > estimate) energies_beyond_estimate.push_back(group);
     energy_over_estimate = std::max(energy_over_estimate, off / std::max(estimate, std::numeric_limits<double>::min()));
     if (energy > 0.0) energy_estimate.push_back(estimate / energy);
   }
@@ -87,14 +82,18 @@ struct Figures {
     std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
     return values[values.size() / 2];
   }
+  static std::string list(std::span<const std::uint64_t> groups) {
+    std::string out;
+    for (const std::uint64_t group : groups) out += (out.empty() ? "" : ", ") + std::to_string(group);
+    return "[" + out + "]";
+  }
   void print(int bodies, double error, double slope_off) const {
     std::printf("{\"name\": \"collision/several/%d/error=%g\", \"groups\": %zu, \"cpu_us_median\": %.0f, \"cpu_us_worst\": %.0f, \"over_pairs_alone_median\": %.2g, "
-                "\"unmet\": %d, \"forces_beyond_estimate\": %d, \"worst_force_over_estimate\": %.2g, \"of_group\": %d, \"energies_off\": %d, \"worst_energy\": %.2g, "
-                "\"of_energy_of_group\": %d, \"energies_beyond_estimate\": %d, \"worst_energy_over_estimate\": %.2g, \"energy_estimate_median\": %.2g, "
-                "\"worst_force_less_energy_slope\": %.2g}\n",
-                bodies, error, cpu_us.size(), middle(cpu_us), *std::max_element(cpu_us.begin(), cpu_us.end()), middle(over_alone), unmet, beyond_estimate,
-                largest_over_estimate, worst_force, energies_off, largest_energy, worst_energy,
-                energies_beyond_estimate, energy_over_estimate, energy_estimate.empty() ? 0.0 : middle(energy_estimate), slope_off);
+                "\"over_pairs_alone_worst\": %.2g, \"unmet\": %d, \"forces_beyond_estimate\": %s, \"worst_force_over_estimate\": %.2g, \"energies_off\": %s, "
+                "\"energies_beyond_estimate\": %s, \"worst_energy_over_estimate\": %.2g, \"energy_estimate_median\": %.2g, \"worst_force_less_energy_slope\": %.2g}\n",
+                bodies, error, cpu_us.size(), middle(cpu_us), *std::max_element(cpu_us.begin(), cpu_us.end()), middle(over_alone),
+                *std::max_element(over_alone.begin(), over_alone.end()), unmet, list(beyond_estimate).c_str(), largest_over_estimate, list(energies_off).c_str(),
+                list(energies_beyond_estimate).c_str(), energy_over_estimate, energy_estimate.empty() ? 0.0 : middle(energy_estimate), slope_off);
     std::fflush(stdout);
   }
 };
@@ -105,15 +104,16 @@ void measure(int count, int groups, std::uint64_t seed) {
   double slope_off = 0.0;
   TimedQuery query;
   for (int n = 0; n < groups; ++n) {
-    BodiesInOnePlace place(count, seed + static_cast<std::uint64_t>(n));
+    const std::uint64_t group = seed + static_cast<std::uint64_t>(n);
+    BodiesInOnePlace place(count, group);
     const std::vector<collision::ContactBody> bodies = place.bodies();
-    const LostVolumes exact = lost_volumes(bodies, kCells), rough = lost_volumes(bodies, kCells / 2);
+    const LostVolumes exact = lost_volumes(bodies, kColumns), rough = lost_volumes(bodies, kColumns / 2);
     for (std::size_t k = 0; k < kErrors.size(); ++k) {
       const ContactsOfBodies found(bodies.size(), query.ask(bodies, kErrors[k], 3));
-      figures[k].add(n, found, exact, rough, kErrors[k]);
+      figures[k].add(group, found, exact, rough, kErrors[k]);
       figures[k].cpu_us.push_back(query.cpu_us);
       const std::vector<double> estimates = query.estimate_energies(bodies, kErrors[k]);
-      figures[k].add_estimate(std::abs(found.energy - exact.energy) - energy_left(exact, rough), std::accumulate(estimates.begin(), estimates.end(), 0.0), exact.energy);
+      figures[k].add_estimate(group, std::abs(found.energy - exact.energy) - energy_left(exact, rough), std::accumulate(estimates.begin(), estimates.end(), 0.0), exact.energy);
       figures[k].over_alone.push_back(figures[k].cpu_us.back() / time_alone(bodies, kErrors[k], query));
     }
     slope_off = std::max(slope_off, off_energy(place, exact, query));

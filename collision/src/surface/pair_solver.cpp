@@ -20,6 +20,9 @@ constexpr double kOfSize = 0.1;
 /// Error below which panels may miss slivers of that size between their nodes.
 constexpr double kFinestPanels = 1e-4;
 
+/// Pressures that differ by less are the same, over the largest.
+constexpr double kTie = 1e-6;
+
 /// Whether a body is convex and certainly does not reach a box: cheaper than bounds of its field.
 bool clear_of(const ContactBody& body, const Box& box) {
   const std::optional<implicit::CorePoint> core = body.field.core_point(box.centre());
@@ -129,6 +132,8 @@ PairSolver::Pressing PairSolver::thirds_press(const Job& job, const PairResult& 
   const double largest = out.summary.largest_pressure, margin = 0.05 * largest, at_rim = kAtRim * job.settings().error * largest;
   const std::size_t points = out.points.point.size();
   taken_.assign(points + rim_.size(), 0);
+  free_.clear();
+  hardest_.assign(points, 0.0);
   value_.resize(taken_.size());
   bool press = false;
   for (std::size_t t = 0; t < third_.size(); ++t) {
@@ -142,10 +147,14 @@ PairSolver::Pressing PairSolver::thirds_press(const Job& job, const PairResult& 
       const double p = third.material.modulus * value_[i], own = i < points ? out.points.pressure[i] : 0.0;
       press = press || p > (i < points ? own - margin : at_rim);
       if (p > (i < points ? own : -at_rim)) taken_[i] = 1;
+      if (i < points) hardest_[i] = std::max(hardest_[i], p);
     }
     for (const PolarCover& cover : patches_.covers()) press = press || imprint_.find(job.polar.pressure, cover, third, margin).has_value();
   }
   if (!press) return Pressing::None;
+  for (std::size_t i = 0; i < points; ++i) {
+    if (hardest_[i] < out.points.pressure[i] - kTie * largest) free_.push_back({out.points.point[i], out.points.normal[i], out.points.pressure[i]});
+  }
   return std::find(taken_.begin(), taken_.end(), 0) == taken_.end() ? Pressing::All : Pressing::Some;
 }
 
@@ -201,10 +210,16 @@ bool PairSolver::polar_cut(const Job& job, PairResult& out) {
   const bool star = stars_cut(job, std::max(error, kFinestPanels), out), coarse = error >= kFinestPanels;
   const bool small = star && out.summary.area > (1.0 - kSmall) * whole;
   if (star && coarse && !small && (out.points.point.empty() || meets(out, error))) return true;
-  if (star && coarse && (apex_[0] || apex_[1])) return false;  // what flows out of these is held to the error by stars alone
+  const bool flows = star && coarse && (apex_[0] || apex_[1]);  // what flows out of these is held to the error by stars alone
+  if (flows && !meets(out, error)) return false;
   std::swap(kept_, out);
   out.summary.bodies = job.pair;
   if (!imprints_cut(job, out)) return false;
+  if (flows) {
+    kept_.summary.error_estimate = std::max(kept_.summary.error_estimate, difference_of(kept_, out));
+    std::swap(kept_, out);
+    return meets(out, error);
+  }
   if (!star || small) return true;
   const double off = difference_of(kept_, out);
   if (coarse) out.summary.error_estimate = std::max(out.summary.error_estimate, off);
@@ -330,7 +345,7 @@ bool PairSolver::imprints_cut(const Job& job, PairResult& out) {
   PolarJob cut = job.polar;
   cut.third = third_bodies_;
   if (!patches_.solve(cut, out)) return false;
-  if (out.points.point.empty()) return true;  // all of it lies in a third body
+  if (out.points.point.empty()) return free_.empty();  // all of it lies in a third body
   out.summary.rule = ContactRule::Polar;
   out.summary.largest_pressure = *std::max_element(out.points.pressure.begin(), out.points.pressure.end());
   return true;
@@ -352,7 +367,7 @@ bool PairSolver::stars_cut(const Job& job, double asked, PairResult& out) {
     }
     PanelOutcome outcome;
     const Vec3& origin = cover.frame.origin;
-    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, job.polar.regions, origin, job.settings().energy, false, &cover, imprints_, apex_}, panel_room_, out.points, outcome)) return false;
+    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, job.polar.regions, origin, job.settings().energy, false, &cover, imprints_, free_, apex_}, panel_room_, out.points, outcome)) return false;
     const PatchSums& sums = outcome.sums;
     out.add(sums, origin);
     share_.push_back({sums.force, sums.first + sums.load * origin, sums.load, sums.area, outcome.estimate});
@@ -361,7 +376,7 @@ bool PairSolver::stars_cut(const Job& job, double asked, PairResult& out) {
     out.summary.largest_overlap = outcome.thickness;
   }
   out.summary.patches = static_cast<std::uint32_t>(covers.size());
-  if (out.points.point.empty()) return true;  // all of it lies in a third body
+  if (out.points.point.empty()) return free_.empty();  // all of it lies in a third body
   out.summary.rule = ContactRule::Polar;
   out.summary.error_estimate = std::min(1.0, estimate_of_all(share_, out));
   return true;

@@ -118,6 +118,7 @@ class PairSolver {
   StartPoints starts_;
   std::vector<ThirdLevel> third_levels_;
   std::vector<ImprintPlace> imprints_;
+  std::vector<FreePlace> free_;  ///< among the points of patches that third bodies press on
   std::vector<PatchShare> share_;
   SqueezedRegion region_;
   Teams teams_;                  ///< of the body of the pair
@@ -127,7 +128,7 @@ class PairSolver {
   std::vector<std::uint32_t> third_;
   ThirdBodies thirds_;  ///< in the same order
   std::vector<const ContactBody*> third_bodies_;
-  std::vector<double> value_;
+  std::vector<double> value_, hardest_;
   std::vector<Vec3> rim_;
   std::vector<std::uint8_t> taken_;  ///< of points and rims, 1: a third body presses harder
   PressureBatch beside_;

@@ -17,11 +17,12 @@ namespace {
 
 using benchmarks::BodiesInOnePlace;
 using benchmarks::ContactsOfBodies;
+using benchmarks::force_left;
 using benchmarks::lost_volumes;
 using benchmarks::LostVolumes;
 using benchmarks::TimedQuery;
 
-constexpr int kCells = 192;
+constexpr int kColumns = 192;
 
 double sum_of(std::span<const double> values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
@@ -31,7 +32,7 @@ void expect_estimates_to_hold(int bodies_each, int groups, std::uint64_t first_s
   for (int n = 0; n < groups; ++n) {
     const BodiesInOnePlace place(bodies_each, first_seed + static_cast<std::uint64_t>(n));
     const std::vector<ContactBody> bodies = place.bodies();
-    const LostVolumes exact = lost_volumes(bodies, kCells), half = lost_volumes(bodies, kCells / 2);
+    const LostVolumes exact = lost_volumes(bodies, kColumns), half = lost_volumes(bodies, kColumns / 2);
     for (const double error : {1e-2, 1e-3, 1e-4}) {
       const ContactsOfBodies found(bodies.size(), query.ask(bodies, error));
       const double estimate = sum_of(query.estimate_energies(bodies, error));
@@ -63,20 +64,33 @@ TEST(EnergyEstimates, AreAboutTheErrorAskedForAtMost) {
   EXPECT_GE(pairs, 20);
 }
 
-// A rod presses on the patch of another one and an ellipsoid beside a kink, where no imprint is found from the middle of the patch.
-TEST(ForcesOfSeveral, LeaveOutWhatAThirdBodyTakesBesideAKink) {
-  constexpr double kOfCells = 6e-3;  // of the load: what sums over cells leave
-  const BodiesInOnePlace place(3, 10155);
+/// Forces on all bodies of a group are within their estimates.
+void expect_forces_within_estimates(int bodies_each, std::uint64_t seed) {
+  const BodiesInOnePlace place(bodies_each, seed);
   const std::vector<ContactBody> bodies = place.bodies();
-  const LostVolumes exact = lost_volumes(bodies, 96);
+  const LostVolumes exact = lost_volumes(bodies, kColumns), half = lost_volumes(bodies, kColumns / 2);
   TimedQuery query;
   for (const double error : {1e-2, 1e-3, 1e-4}) {
     const ContactsOfBodies found(bodies.size(), query.ask(bodies, error));
-    for (std::size_t b = 0; b < bodies.size(); ++b) EXPECT_LE((found.force[b] - exact.force[b]).norm(), kOfCells * exact.load[b] + found.off[b]) << b << ' ' << error;
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      EXPECT_LE((found.force[b] - exact.force[b]).norm(), force_left(exact, half, b) + found.off[b]) << seed << ' ' << b << ' ' << error;
+    }
   }
 }
 
-/// Field evaluations of all pairs of a group; none where one is marched, or where no third body takes part.
+// A rod presses on the patch of another one and an ellipsoid beside a kink, where no imprint is found from the middle of the patch.
+TEST(ForcesOfSeveral, LeaveOutWhatAThirdBodyTakesBesideAKink) { expect_forces_within_estimates(3, 10155); }
+
+// Third bodies leave a pair a small share of its patch, at its border and between the nodes of a star.
+TEST(ForcesOfSeveral, HoldWhatThirdBodiesLeaveOfAPatch) {
+  expect_forces_within_estimates(4, 320086);
+  expect_forces_within_estimates(4, 320094);
+}
+
+// Rays of a star lead to another sheet of Sigma, which does not press, and so do those beside them.
+TEST(ForcesOfSeveral, HoldWhatRaysLoseToAnotherSheet) { expect_forces_within_estimates(3, 350099); }
+
+/// Field evaluations of all pairs of a group; none where a pair is marched for its force, or where no third body takes part.
 std::optional<double> evaluations_of(std::span<const ContactBody> bodies, bool energy) {
   ContactCandidates candidates;
   ContactSurface surface;
@@ -86,22 +100,22 @@ std::optional<double> evaluations_of(std::span<const ContactBody> bodies, bool e
   if (surface.summary.size() < 2) return std::nullopt;
   double sum = 0.0;
   for (const ContactSurface::Summary& s : surface.summary) {
-    if (s.rule != ContactRule::Polar) return std::nullopt;
+    if (!energy && s.rule != ContactRule::Polar) return std::nullopt;
     sum += static_cast<double>(s.evaluations);
   }
   return sum;
 }
 
-// All pairs of a body share one search for its apex, and panels are not divided where its pressure hardly falls along a column.
+// All pairs of a body share one search for its apex. Panels are not divided where its pressure hardly falls along a column: pairs would be marched for their energy.
 TEST(EnergiesOfSeveral, TakeAFewTimesTheEvaluationsOfForces) {
   int groups = 0;
   for (std::uint64_t seed = 9917; seed < 9943; ++seed) {
     const BodiesInOnePlace place(3, seed);
     const std::vector<ContactBody> bodies = place.bodies();
-    const std::optional<double> forces = evaluations_of(bodies, false), energies = evaluations_of(bodies, true);
-    if (!forces || !energies) continue;
+    const std::optional<double> forces = evaluations_of(bodies, false);
+    if (!forces) continue;
     ++groups;
-    EXPECT_LT(*energies, 8.0 * *forces) << seed;
+    EXPECT_LT(evaluations_of(bodies, true).value(), 8.0 * *forces) << seed;
   }
   EXPECT_GE(groups, 7);
 }
@@ -139,8 +153,21 @@ TEST(SqueezedRegions, HoldShortPiecesOfColumns) {
   for (const std::uint64_t seed : {9917u + 28u, 9917u + 57u}) {
     const BodiesInOnePlace place(2, seed);
     const std::vector<ContactBody> bodies = place.bodies();
-    const double energy = lost_volumes(bodies, kCells).energy;
+    const double energy = lost_volumes(bodies, kColumns).energy;
     EXPECT_NEAR(ContactsOfBodies(bodies.size(), query.ask(bodies, 1e-4)).energy, energy, kOff * energy) << seed;
+  }
+}
+
+/// A corner of the region reaches into a cell between its columns, and between those of its quarters.
+TEST(SqueezedRegions, HoldCornersBetweenColumns) {
+  TimedQuery query;
+  const BodiesInOnePlace place(2, 10125);
+  const std::vector<ContactBody> bodies = place.bodies();
+  const LostVolumes exact = lost_volumes(bodies, kColumns), half = lost_volumes(bodies, kColumns / 2);
+  for (const double error : {1e-3, 1e-4, 1e-6}) {
+    const double off = std::abs(ContactsOfBodies(bodies.size(), query.ask(bodies, error)).energy - exact.energy);
+    EXPECT_LE(off, 5e-4 * exact.energy) << error;
+    EXPECT_LE(off, sum_of(query.estimate_energies(bodies, error)) + energy_left(exact, half)) << error;
   }
 }
 

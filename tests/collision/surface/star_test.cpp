@@ -66,20 +66,19 @@ std::vector<ContactSurface::Summary> query(std::span<const ContactBody> bodies, 
 
 /// Groups of bodies in one place: forces within their estimates and energies within the error of sums over the volumes that the bodies lose.
 void expect_forces_and_energy_of_volumes(int bodies_each, int groups, std::uint64_t first_seed) {
-  constexpr int kCells = 96;
-  constexpr double kOfCells = 6e-3;  // of the loads: about n^-1.5 at the borders of the volumes, times a few
+  constexpr int kColumns = 96;
   int all_touch = 0;
   for (int n = 0; n < groups; ++n) {
     const benchmarks::BodiesInOnePlace place(bodies_each, first_seed + static_cast<std::uint64_t>(n));
     const std::vector<ContactBody> bodies = place.bodies();
-    const benchmarks::LostVolumes exact = benchmarks::lost_volumes(bodies, kCells), rough = benchmarks::lost_volumes(bodies, kCells / 2);
+    const benchmarks::LostVolumes exact = benchmarks::lost_volumes(bodies, kColumns), half = benchmarks::lost_volumes(bodies, kColumns / 2);
     for (const double error : {1e-2, 1e-3}) {
       const benchmarks::ContactsOfBodies found(bodies.size(), query(bodies, error));
       EXPECT_LE(found.largest_estimate, 1.01 * error) << n;
       for (std::size_t b = 0; b < bodies.size(); ++b) {
-        EXPECT_LE((found.force[b] - exact.force[b]).norm(), found.off[b] + kOfCells * exact.load[b] + (exact.force[b] - rough.force[b]).norm()) << n << ' ' << b << ' ' << error;
+        EXPECT_LE((found.force[b] - exact.force[b]).norm(), found.off[b] + force_left(exact, half, b)) << n << ' ' << b << ' ' << error;
       }
-      EXPECT_NEAR(found.energy, exact.energy, (error + kOfCells) * exact.energy) << n << ' ' << error;
+      EXPECT_NEAR(found.energy, exact.energy, error * exact.energy + energy_left(exact, half)) << n << ' ' << error;
       all_touch += found.pairs == bodies.size() * (bodies.size() - 1) / 2 ? 1 : 0;
     }
   }

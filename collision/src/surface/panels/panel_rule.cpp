@@ -12,6 +12,9 @@
 namespace supple::collision {
 namespace {
 
+/// Share of what two orders of a flux differ by: the finer one is off by less, and energies have estimates of their own.
+constexpr double kOfFlux = 0.25;
+
 constexpr std::size_t kMostPanels = 4096, kMostOfStar = 512;
 constexpr int kMostDepth = 24;
 
@@ -76,6 +79,7 @@ class PanelSolver {
   void measure(std::size_t first);
   void look_for_starts(Panel& panel) const;
   void look_for_imprints(Panel& panel) const;
+  void look_for_free_places(Panel& panel) const;
   [[nodiscard]] double estimate();
   [[nodiscard]] double error_of(const Panel& panel) const;
   [[nodiscard]] double energy_scale() const;
@@ -184,6 +188,15 @@ bool PanelSolver::set_star(double margin) {
   set_enough(std::max(cover.thickness, frame.thickness));
   r_.start.clear();
   r_.start_pressure.clear();
+  r_.free.clear();
+  r_.free_pressure.clear();
+  for (const FreePlace& free : job_.free) {
+    if (!(free.normal.dot(frame.axis) > 0.0)) continue;
+    const Vec3 y = setting_.view.frame.local(free.at);
+    const PlaneChart::Place place = setting_.chart.place_of({y[0], y[1]});
+    r_.free.emplace_back(place[0], place[1], y[2]);
+    r_.free_pressure.push_back(free.pressure);
+  }
   return true;
 }
 
@@ -366,6 +379,7 @@ void PanelSolver::measure(std::size_t first) {
   for (const std::uint32_t i : r_.which) {
     Panel& panel = r_.panel[i];
     if (panel.points.size() == 0) look_for_starts(panel);
+    if (panel.points.size() == 0 && job_.star != nullptr) look_for_free_places(panel);
     if (panel.points.size() > 0) look_for_imprints(panel);
     if (!panel.steep) continue;
     panel.off = panel.sums;
@@ -395,6 +409,27 @@ void PanelSolver::look_for_starts(Panel& panel) const {
   panel.missed_load = std::max(panel.missed_load, most * area / 3.0);
 }
 
+/// A panel of a star without points that holds a place where the pair presses harder than third bodies misses something. Where none of its rays leads to such a place, these
+/// have met another sheet of Sigma.
+void PanelSolver::look_for_free_places(Panel& panel) const {
+  constexpr double kEnds = 10.0;  // of steps that are enough: how far off heights may be
+  const std::span<const SigmaRay> nodes = std::span(r_.arena.node).subspan(panel.nodes.begin, panel.nodes.size());
+  for (std::size_t i = 0; i < r_.free.size(); ++i) {
+    const Vec3& free = r_.free[i];
+    const auto within = [&](std::size_t k) { return free[static_cast<Eigen::Index>(k)] >= panel.low[k] && free[static_cast<Eigen::Index>(k)] <= panel.high[k]; };
+    if (!within(0) || !within(1) || !within(2)) continue;
+    const PlaneChart::Place at = setting_.chart.at({free[0], free[1]});
+    const auto leads_there = [&](const SigmaRay& ray) {
+      const double off = std::hypot(ray.at[0] - at[0], ray.at[1] - at[1]);
+      return ray.found && std::abs(ray.height - free[2]) <= off / kRayCosine + kEnds * setting_.enough;
+    };
+    panel.steep = panel.steep || std::none_of(nodes.begin(), nodes.end(), leads_there);
+    const double area = (panel.high[0] - panel.low[0]) * (panel.high[1] - panel.low[1]) * setting_.chart.stretch({free[0], free[1]}) / (setting_.order * setting_.order);  // what a node stands for
+    panel.missed_area = std::max(panel.missed_area, area);
+    panel.missed_load = std::max(panel.missed_load, area * r_.free_pressure[i]);
+  }
+}
+
 /// A panel that holds a place where a third body presses harder, which none of its lines tells, has too much by what lies between nodes.
 void PanelSolver::look_for_imprints(Panel& panel) const {
   for (const ImprintPlace& imprint : job_.imprint) {
@@ -420,7 +455,7 @@ double PanelSolver::error_of(const Panel& panel) const {
   if (!(all_.load > 0.0) || !(all_.area > 0.0)) return panel.missed_load > 0.0 ? 1.0 : 0.0;
   const Vec3 first = panel.off.first - panel.off.load * all_.centre();
   return std::max({(panel.off.force.norm() + panel.missed_load) / force_scale(all_.force, all_.load), (std::abs(panel.off.area) + panel.missed_area) / all_.area,
-                   first.norm() / (all_.load * std::sqrt(all_.area)), std::abs(panel.off.flux[0] + panel.off.flux[1]) / energy_});
+                   first.norm() / (all_.load * std::sqrt(all_.area)), kOfFlux * std::abs(panel.off.flux[0] + panel.off.flux[1]) / energy_});
 }
 
 /// What two orders differ by over all panels, and what is left where their differences cancel by chance: the root of the sum of squares.
@@ -450,7 +485,7 @@ double PanelSolver::estimate() {
   const double force = (e.force.norm() + std::sqrt(e.force_square) + e.missed_load) / force_scale(all_.force, all_.load);
   const double area = (std::abs(e.area) + std::sqrt(e.area_square) + e.missed_area) / all_.area;
   const double first = (e.first.norm() + std::sqrt(e.first_square)) / (all_.load * std::sqrt(all_.area));
-  const double energy = (std::abs(e.energy) + std::sqrt(e.energy_square)) / energy_;
+  const double energy = kOfFlux * (std::abs(e.energy) + std::sqrt(e.energy_square)) / energy_;
   return kTwoOrders * std::max({force, area, first, energy});
 }
 

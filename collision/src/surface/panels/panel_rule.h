@@ -21,6 +21,12 @@ struct ImprintPlace {
   std::size_t third;  ///< of `PanelJob::third`
 };
 
+/// A place of Sigma where the pair presses harder than all third bodies.
+struct FreePlace {
+  Vec3 at, normal;
+  double pressure;
+};
+
 struct PanelJob {
   PairPressure& pressure;
   std::span<const ThirdLevel> third;  ///< that reach the overlap
@@ -33,6 +39,7 @@ struct PanelJob {
   bool graph_only;                    ///< fits only where Sigma seems to be one graph over a plane
   const PolarCover* star = nullptr;   ///< panels of a star about its origin, which holds one patch; or null: of the plane across the mean normal
   std::span<const ImprintPlace> imprint{};  ///< that may lie between nodes
+  std::span<const FreePlace> free{};        ///< that may, too
   std::array<std::optional<Apex>, 2> apex{};  ///< that what A, B lose flows out of: what flows is held to the error, too
 };
 
@@ -52,6 +59,8 @@ struct PanelRoom {
   std::vector<implicit::Kink> kink;
   std::vector<Vec3> start, normal;     // places that press, in the frame of the rays; normals there
   std::vector<double> start_pressure;  // about that of Sigma near these [Pa]
+  std::vector<Vec3> free;              // angles, shares and heights of places that the pair presses hardest on,
+  std::vector<double> free_pressure;   // and how hard [Pa]
   /// Out of a body, from a place of Sigma, and between which lengths the body ends.
   struct Way {
     Vec3 from;

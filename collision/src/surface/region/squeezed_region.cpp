@@ -224,7 +224,30 @@ bool SqueezedRegion::choose(double error) {
   const auto first = std::find_if(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return grows_beyond(cell, kOfKept * error); });
   split_.assign(first, leaf_.end());
   leaf_.erase(first, leaf_.end());
+  add_empty_neighbours();
   return true;
+}
+
+/// Cells that hold nothing join `split_` where they touch a smaller one of these that holds something: a corner of the region may lie between their columns, which two
+/// orders do not tell.
+void SqueezedRegion::add_empty_neighbours() {
+  const auto touch = [](const Cell& p, const Cell& q) {
+    constexpr double kBeside = 1e-6;  // of a width
+    const auto along = [&](std::size_t k) {
+      const double gap = kBeside * p.width[k];
+      return p.corner[k] <= q.corner[k] + q.width[k] + gap && q.corner[k] <= p.corner[k] + p.width[k] + gap;
+    };
+    return along(0) && along(1);
+  };
+  const std::size_t chosen = split_.size();
+  const auto joins = [&](const Cell& cell) {
+    if (cell.begin != cell.end) return false;
+    const auto beside = [&](const Cell& other) { return other.begin != other.end && cell.width[0] > 1.5 * other.width[0] && touch(cell, other); };
+    return std::any_of(split_.begin(), split_.begin() + static_cast<std::ptrdiff_t>(chosen), beside);
+  };
+  const auto kept = std::stable_partition(leaf_.begin(), leaf_.end(), [&](const Cell& cell) { return !joins(cell); });
+  split_.insert(split_.end(), kept, leaf_.end());
+  leaf_.erase(kept, leaf_.end());
 }
 
 void SqueezedRegion::fill(const Lost& lost, const Box& overlap, const Vec3& across, PatchPoints& points) {

@@ -65,6 +65,7 @@ class SqueezedRegion {
   void add_piece(std::size_t column, double low, double high);
   void quarter(const Lost& lost);
   bool choose(double error);
+  void add_empty_neighbours();
 
   Vec3 origin_, along_;
   std::array<Vec3, 2> across_;
