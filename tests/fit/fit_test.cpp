@@ -17,7 +17,9 @@ void expect_good(const FittedObject& object, double error, long genus) {
   EXPECT_LE(r.two_sided(), error);
   EXPECT_LE(std::max(r.from_data.rms, r.to_data.rms), 0.25 * error);
   EXPECT_GE(r.from_data.largest, r.from_data.rms);
-  EXPECT_LT(std::abs(r.volume_error), 0.02);
+  // The volume between the surfaces is their mean distance, at most the RMS one, times the area; a tenth more for the curvature.
+  const double area = inspect(object.data).area;
+  EXPECT_LT(std::abs(r.volume_error), 1.1 * std::max(r.from_data.rms, r.to_data.rms) * r.diagonal * area / r.volume);
   EXPECT_EQ(r.genus_in, genus);
   EXPECT_EQ(r.genus_out, genus);
   EXPECT_EQ(r.pieces_out, 1U);
@@ -44,6 +46,28 @@ TEST(Fit, DumbbellOfTwoBalls) {
     return Vec3(2.0 * p.x(), waist * p.y(), waist * p.z());
   });
   expect_good(fit(test::saved(mesh, "dumbbell"), {.error = 0.02, .particles = 50}), 0.02, 0);
+}
+
+TEST(Fit, OneEllipsoidDescribesAnEllipsoid) {
+  // The kernel of an ellipsoid has ellipsoids as level sets. Points take dozens.
+  const Mesh mesh = test::moved_sphere(4, [](const Vec3& p) { return Vec3(3.0 * p.x(), 2.0 * p.y(), p.z()); });
+  const FittedObject object = fit(test::saved(mesh, "one_ellipsoid"), {.error = 0.02, .particles = 1});
+  expect_good(object, 0.02, 0);
+  EXPECT_EQ(object.primitives.size(), 1U);
+}
+
+TEST(Fit, CoarserErrorsTakeFewerPrimitives) {
+  // A ball with six bumps.
+  const Mesh mesh = test::moved_sphere(5, [](const Vec3& p) -> Vec3 { return (1.0 + 0.6 * (p.x() * p.x() * p.x() * p.x() + p.y() * p.y() * p.y() * p.y() + p.z() * p.z() * p.z() * p.z())) * p; });
+  const auto file = test::saved(mesh, "bumps");
+  std::size_t finer = 1000;
+  for (const double error : {0.02, 0.1}) {
+    const FittedObject object = fit(file, {.error = error, .particles = 1});
+    EXPECT_TRUE(object.report.within) << error;
+    EXPECT_LE(std::max(object.report.from_data.rms, object.report.to_data.rms), 0.25 * error);
+    EXPECT_LT(object.primitives.size(), finer) << error;
+    finer = object.primitives.size();
+  }
 }
 
 TEST(Fit, DoesNotDependOnThreads) {

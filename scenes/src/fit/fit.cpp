@@ -98,9 +98,10 @@ Targets targets_of(const Data& data) {
   return out;
 }
 
+/// Ellipsoids that begin as balls.
 std::vector<Blob> blobs_of(std::span<const Ball> balls) {
   std::vector<Blob> out;
-  for (const Ball& ball : balls) out.push_back({.centre = ball.centre, .axes = Vec3::Constant(ball.radius / kPointRadius)});
+  for (const Ball& ball : balls) out.push_back({.centre = ball.centre, .axes = Vec3::Constant(ball.radius / kPointRadius), .round = false});
   return out;
 }
 
@@ -108,8 +109,10 @@ std::vector<Blob> blobs_of(std::span<const Ball> balls) {
 struct Faults {
   std::vector<std::uint32_t> missed;  ///< samples of the data outside the fit
   std::vector<Vec3> inside, outside;  ///< points of the fitted surface inside and outside the data
-  double largest = 1.0;
+  double largest = 1.0, rms = 1.0;    ///< distance
   long topology = std::numeric_limits<long>::max();  ///< pieces and handles that the fitted surface has too many or too few
+
+  [[nodiscard]] bool within(const Faults& limit) const { return largest <= limit.largest && rms <= limit.rms && topology <= limit.topology; }
 
   /// @param enough  a distance that needs no mending
   [[nodiscard]] bool better_than(const Faults& other, double enough) const {
@@ -156,6 +159,8 @@ Faults find_faults(const Data& data, const implicit::Field& field, double cell, 
     out.largest = std::max(out.largest, of_data[k]);
     if (of_data[k] > most && value[k] < 0.0) out.missed.push_back(k);
   }
+  const auto mean_square = [](const std::vector<double>& d) { return std::inner_product(d.begin(), d.end(), d.begin(), 0.0) / static_cast<double>(d.size()); };
+  out.rms = std::sqrt(std::max(mean_square(of_data), mean_square(of_fit)));
   const MeshReport report = inspect(mesh);
   out.topology = std::abs(static_cast<long>(report.components) - static_cast<long>(data.pieces)) + std::abs(genus_of(report) - data.genus);
   const std::vector<char> small = on_small_pieces(mesh);
@@ -170,6 +175,14 @@ Faults find_faults(const Data& data, const implicit::Field& field, double cell, 
     (data.tree.signed_distance(kept.back()) < 0.0 ? out.inside : out.outside).push_back(kept.back());
   }
   return out;
+}
+
+/// Holds points of the fitted surface where it is wrong to their side of it. @param least  distance from the data that such a point counts as at least
+void hold_signs(const Faults& faults, const Data& data, double least, Targets& targets) {
+  constexpr double kWeight = 4.0;  // over the distance
+  const auto weight = [&](const Vec3& p) { return kWeight * std::max(data.tree.distance(p), least); };
+  for (const Vec3& p : faults.inside) targets.inside.add(p, weight(p));
+  for (const Vec3& p : faults.outside) targets.outside.add(p, weight(p));
 }
 
 /// Blobs that no sample needs are dropped: those whose share of the field stays small wherever it is compared with the data.
@@ -237,21 +250,23 @@ struct Skeleton {
   double cell = 0.0;  ///< of meshes that show its errors
 };
 
-Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executor& executor) {
+constexpr double kEnough = 0.75;  // of the error: a distance between samples that leaves room for those between them
+constexpr int kIterations = 8;
+
+/// Balls that cover the surface, moved and resized, with more of them where the distances are larger than the error.
+/// @param targets  receives points that have to be held to their side   @return what is left
+Faults mend(const Data& data, double error, std::uint32_t most_blobs, const SolveOptions& solving, const Executor& executor, Targets& targets, Skeleton& out) {
   constexpr double kReach = 0.6, kFirst = 0.35;  // of the error: balls reach samples, and distances that call for more
-  constexpr double kLeastReach = 0.15, kEnough = 0.8, kFiner = 0.6;
-  constexpr double kWeight = 4.0;  // of a point where the sign is wrong, over its distance from the data
-  constexpr int kRounds = 8, kIterations = 8;
-  Targets targets = targets_of(data);
+  constexpr double kLeastReach = 0.15, kFiner = 0.6;
+  constexpr int kRounds = 8;
   std::vector<std::uint32_t> all(data.surface.position.size());
   std::iota(all.begin(), all.end(), 0U);
-  std::vector<Ball> balls = cover_surface(data.surface, data.points, data.radius, all, kReach * options.error);
+  std::vector<Ball> balls = cover_surface(data.surface, data.points, data.radius, all, kReach * error);
   cover_inside(data.around, data.largest_ball, balls);
-  if (balls.size() > options.primitives) balls.resize(options.primitives);
-  Skeleton out{blobs_of(balls), std::min(0.5 * options.error, 1.0 / 128.0)};
-  const SolveOptions solving{.iterations = kIterations, .smallest = 0.25 * options.error / kPointRadius, .largest = 1.5 * data.largest_ball / kPointRadius};
-  const double enough = kEnough * options.error;
-  double reach = kReach * options.error, most = kFirst * options.error;
+  if (balls.size() > most_blobs) balls.resize(most_blobs);
+  out = {blobs_of(balls), std::min(0.5 * error, 1.0 / 128.0)};
+  const double enough = kEnough * error;
+  double reach = kReach * error, most = kFirst * error;
   std::vector<Blob> blobs = out.blobs;
   Faults least;
   for (int round = 0; round < kRounds; ++round) {
@@ -268,18 +283,111 @@ Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executo
     }
     if ((least.topology == 0 && least.largest <= enough) || round + 1 == kRounds) break;
     if (faults.largest <= enough) most *= kFiner;  // what is wrong in the topology is smaller
-    const auto weight = [&](const Vec3& p) { return kWeight * std::max(data.tree.distance(p), most); };
-    for (const Vec3& p : faults.inside) targets.inside.add(p, weight(p));
-    for (const Vec3& p : faults.outside) targets.outside.add(p, weight(p));
-    reach = std::max(0.7 * reach, kLeastReach * options.error);
+    hold_signs(faults, data, most, targets);
+    reach = std::max(0.7 * reach, kLeastReach * error);
     divide(blobs, data, field, faults.outside, reach);
-    if (blobs.size() > options.primitives) blobs.resize(options.primitives);
+    if (blobs.size() > most_blobs) blobs.resize(most_blobs);
     std::vector<Ball> more = cover_surface(data.surface, data.points, data.radius, faults.missed, reach);
     for (const Vec3& p : faults.inside) more.push_back({p, std::min(data.tree.distance(p), data.largest_ball)});
-    more.resize(std::min<std::size_t>(more.size(), options.primitives - std::min<std::size_t>(options.primitives, blobs.size())));
+    more.resize(std::min<std::size_t>(more.size(), most_blobs - std::min<std::size_t>(most_blobs, blobs.size())));
     const std::vector<Blob> added = blobs_of(more);
     blobs.insert(blobs.end(), added.begin(), added.end());
   }
+  return least;
+}
+
+/// The blobs without which the surface moves least, at most so many, no two of them at one sample. @param kept  those that stay
+std::vector<std::uint32_t> least_needed(std::span<const Blob> blobs, const Data& data, std::span<const char> kept, std::size_t most) {
+  constexpr double kCarries = 0.1;  // value with which a blob is at a sample, of the iso value 1/2
+  implicit::Field field;
+  build_field(blobs, field);
+  implicit::FieldParts parts;
+  implicit::FieldView(field).evaluate_parts(data.surface.position, parts);
+  std::vector<double> need(blobs.size(), 0.0);  // sum of squares of the distances by which samples would move
+  std::vector<std::vector<std::uint32_t>> carried(blobs.size());
+  for (std::uint32_t s = 0; s < data.surface.position.size(); ++s) {
+    for (std::uint32_t e = parts.offset[s]; e < parts.offset[s + 1]; ++e) {
+      const double distance = parts.value[e] * data.radius[s];
+      need[parts.part[e]] += distance * distance;
+      if (parts.value[e] > kCarries) carried[parts.part[e]].push_back(s);
+    }
+  }
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t b = 0; b < blobs.size(); ++b) {
+    if (kept[b] == 0) order.push_back(b);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return need[a] < need[b]; });
+  std::vector<char> touched(data.surface.position.size(), 0);
+  std::vector<std::uint32_t> out;
+  for (const std::uint32_t b : order) {
+    if (out.size() == most) break;
+    if (std::any_of(carried[b].begin(), carried[b].end(), [&](std::uint32_t s) { return touched[s] != 0; })) continue;
+    for (const std::uint32_t s : carried[b]) touched[s] = 1;
+    out.push_back(b);
+  }
+  return out;
+}
+
+/// All but some. @param which  sorted or not
+template <class T>
+std::vector<T> without(const std::vector<T>& all, std::span<const std::uint32_t> which) {
+  std::vector<char> gone(all.size(), 0);
+  for (const std::uint32_t k : which) gone[k] = 1;
+  std::vector<T> out;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (gone[k] == 0) out.push_back(all[k]);
+  }
+  return out;
+}
+
+/// Drops the blobs least needed, many at once and fewer where that fails, while the others can be moved, turned and resized so that
+/// the faults stay within a limit.
+void thin(const Data& data, const Faults& limit, const SolveOptions& solving, const Executor& executor, Targets& targets, Skeleton& skeleton) {
+  constexpr double kMostShare = 0.3;
+  constexpr int kMostAttempts = 25;
+  std::vector<char> kept(skeleton.blobs.size(), 0);  // without these it failed
+  std::size_t batch = skeleton.blobs.size();
+  for (int attempt = 0; attempt < kMostAttempts && skeleton.blobs.size() > 1; ++attempt) {
+    heed_scope();
+    const auto most = static_cast<std::size_t>(kMostShare * static_cast<double>(skeleton.blobs.size()));
+    batch = std::max<std::size_t>(std::min(batch, most), 1);
+    const std::vector<std::uint32_t> dropped = least_needed(skeleton.blobs, data, kept, batch);
+    if (dropped.empty()) break;
+    std::vector<Blob> tried = without(skeleton.blobs, dropped);
+    balance(tried, targets, solving, executor);
+    solve(tried, targets, solving, executor);
+    implicit::Field field;
+    build_field(tried, field);
+    const Faults faults = find_faults(data, field, skeleton.cell, limit.largest, executor);
+    if (faults.within(limit)) {
+      skeleton.blobs = std::move(tried);
+      kept = without(kept, dropped);
+      batch = 2 * dropped.size();
+      continue;
+    }
+    hold_signs(faults, data, limit.largest, targets);
+    for (const std::uint32_t s : faults.missed) {
+      const Vec3& p = data.surface.position[s];
+      const auto nearer = [&](std::uint32_t a, std::uint32_t b) { return (skeleton.blobs[a].centre - p).squaredNorm() < (skeleton.blobs[b].centre - p).squaredNorm(); };
+      kept[*std::min_element(dropped.begin(), dropped.end(), nearer)] = 1;
+    }
+    if (dropped.size() == 1) kept[dropped.front()] = 1;
+    batch = dropped.size() / 2;
+  }
+}
+
+/// A finer skeleton than coarse errors need, thinned to them: few balls that leave the data by much are no start for least squares.
+Skeleton fit_skeleton(const Data& data, const FitOptions& options, const Executor& executor) {
+  constexpr double kCoarsest = 0.02, kRms = 0.25;
+  const double error = std::min(options.error, kCoarsest);
+  SolveOptions solving{.iterations = kIterations, .smallest = 0.25 * error / kPointRadius, .largest = 1.5 * data.largest_ball / kPointRadius};
+  Targets targets = targets_of(data);
+  Skeleton out;
+  Faults limit = mend(data, error, options.primitives, solving, executor, targets, out);
+  limit.largest = std::max(limit.largest, kEnough * options.error);
+  limit.rms = std::max(limit.rms, kEnough * kRms * options.error);
+  solving.iterations = kIterations / 2;  // from one attempt to the next little changes
+  thin(data, limit, solving, executor, targets, out);
   return out;
 }
 
