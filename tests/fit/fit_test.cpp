@@ -68,6 +68,7 @@ TEST(Fit, CoarserErrorsTakeFewerPrimitives) {
     EXPECT_LT(object.primitives.size(), finer) << error;
     finer = object.primitives.size();
   }
+  EXPECT_LE(finer, 7U);  // one for each bump and one for the middle
 }
 
 TEST(Fit, DoesNotDependOnThreads) {
