@@ -120,6 +120,15 @@ TEST(EnergiesOfSeveral, TakeAFewTimesTheEvaluationsOfForces) {
   EXPECT_GE(groups, 7);
 }
 
+// A third body takes a small part of a patch: a star holds what flows out of the bodies to the error, and imprints confirm it.
+TEST(EnergiesOfSeveral, AreNotMarchedBesideSmallImprints) {
+  TimedQuery query;
+  const BodiesInOnePlace place(3, 9917);
+  const std::vector<ContactBody> bodies = place.bodies();
+  EXPECT_EQ(query.ask(bodies, 1e-3).size(), 3u);
+  for (const ContactSurface::Summary& s : query.surface.summary) EXPECT_EQ(s.rule, ContactRule::Polar) << s.bodies.a << ' ' << s.bodies.b;
+}
+
 // At an error that coarse meshes meet, marching takes no finer ones.
 TEST(Marching, TakesFewerPointsAtCoarserErrors) {
   std::array<std::size_t, 2> points{};
