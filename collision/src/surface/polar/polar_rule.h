@@ -82,7 +82,7 @@ class PolarRuleSolver {
   [[nodiscard]] double algebraic_error() const;
   [[nodiscard]] Vec3 direction(double cosine, double sine) const { return cosine * frame_.u + sine * frame_.v; }
 
-  // Patches that kinks cross: split_rule.cpp; crossings of rays: cross_kinks.cpp.
+  // Patches that levels cross: split_rule.cpp; which do: cross_kinks.cpp.
   /// Gauss points through a squeezed region.
   static int column_of(double error) { return error >= 1e-4 ? 3 : error >= 1e-6 ? 4 : error >= 1e-8 ? 5 : 6; }
   struct Panel {
