@@ -14,9 +14,10 @@
 
 namespace supple::collision {
 
+/// A point of a patch's rim in the frame of the patch.
 struct RimPoint {
   Vec2 at = Vec2::Zero();       // in units of u and v
-  double height = 0.0;
+  double height = 0.0;          // [m]
   Vec2 outward = Vec2::Zero();  // the pressure falls
 };
 

@@ -16,7 +16,6 @@ void PatchLevels::evaluate_thirds(std::span<const Vec3> points) {
   }
 }
 
-/// s of a kink; of a third body, how much harder than the pair it presses where the axis through x meets Sigma, to first order.
 double PatchLevels::value(std::size_t level, const PeakFrame& frame, PairPressure& pressure, const Vec3& x) const {
   if (level < kink.size()) return kink[level].value(x);
   const ContactBody& body = *third[level - kink.size()];
@@ -25,7 +24,6 @@ double PatchLevels::value(std::size_t level, const PeakFrame& frame, PairPressur
   return body.material.modulus * body.field.value(x) - (share * a + (1.0 - share) * b);
 }
 
-/// The same with its slope at point i of a batch, for which the third bodies have been evaluated.
 double PatchLevels::value(std::size_t level, const PeakFrame& frame, const PressureBatch& at, std::size_t i, Vec3& slope) const {
   if (level < kink.size()) return kink[level].value(at.point[i], slope);
   const std::size_t k = (level - kink.size()) * at.size() + i;

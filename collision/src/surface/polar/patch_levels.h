@@ -25,8 +25,11 @@ struct PatchLevels {
   std::vector<Vec3> third_slope;
 
   [[nodiscard]] bool is_kink(std::size_t level) const { return level < kink.size(); }
+  /// To `third_value` and `third_slope`.
   void evaluate_thirds(std::span<const Vec3> points);
+  /// s of a kink; of a third body, how much harder than the pair it presses where the axis through x meets Sigma, to first order [Pa].
   [[nodiscard]] double value(std::size_t level, const PeakFrame& frame, PairPressure& pressure, const Vec3& x) const;
+  /// The same with its slope at point i of a batch, for which the third bodies have been evaluated.
   [[nodiscard]] double value(std::size_t level, const PeakFrame& frame, const PressureBatch& at, std::size_t i, Vec3& slope) const;
 };
 

@@ -14,14 +14,15 @@
 
 namespace supple::collision {
 
+/// Where a ray crosses a level on Sigma.
 struct Crossing {
   std::size_t ray, level;
-  double radius, height;  // radius over that of the rim
-  double left, right;     // it lies between these
-  bool good;
+  double radius, height;  // radius over that of the rim; [m]
+  double left, right;     // the radius lies between these
+  bool good;              // Newton's method has found it
 };
 
-/// Heights of Sigma along rays, at a share s of each: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest).
+/// Heights of Sigma along rays [m], at a share s of each: s linear + s^2 (square + s^2 rest), about a star s linear + s^2 (square + s rest).
 struct RayHeights {
   std::vector<double> linear, square, rest;
   bool star = false;

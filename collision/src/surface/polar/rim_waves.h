@@ -11,7 +11,7 @@
 
 namespace supple::collision {
 
-/// Directions from the peak, and where the rim is met on them.
+/// Directions from the origin of a patch's frame, and where the rim is met on them: radii in units of u and v, heights in metres.
 struct Rays {
   std::vector<double> cosine, sine, radius, height;  // (cosine, sine): about the middle, of any length
   std::vector<Vec2> outward;                         // the pressure falls, in units of u and v
