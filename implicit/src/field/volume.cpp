@@ -7,11 +7,13 @@
 #include <limits>
 
 #include "supple/core/error.h"
+#include "supple/core/interrupt.h"
 
 namespace supple::implicit {
 
 namespace {
 
+constexpr double kLeastCell = 1e-12;  // of the largest coordinate, whose round-off hides what is smaller
 constexpr int kEdge = 4;  // cells along a block
 constexpr std::size_t kCells = kEdge * kEdge * kEdge;
 constexpr double kShift = 0.5;                        // of the surface, to either side [cells]
@@ -138,42 +140,58 @@ class CutBlock {
   std::vector<std::size_t> open_;
 };
 
+using Place = Eigen::Matrix<std::int64_t, 3, 1>;
+
+/// Calls visit(place) for all places from `first` to `last` that lie in no box of blocks which reaches(first, last) denies, x fastest, z slowest.
+template <class Reaches, class Visit>
+void for_places(const Place& first, const Place& last, const Reaches& reaches, const Visit& visit) {
+  if (!reaches(first, last)) return;
+  Eigen::Index axis = 2;
+  while (axis >= 0 && first[axis] == last[axis]) --axis;
+  if (axis < 0) return visit(first);
+  const std::int64_t middle = first[axis] + (last[axis] - first[axis]) / 2;
+  Place end = last, begin = first;
+  end[axis] = middle;
+  begin[axis] = middle + 1;
+  for_places(first, end, reaches, visit);
+  for_places(begin, last, reaches, visit);
+}
+
 /// Calls whole(block) for blocks that bounds show to be inside, cut(block) for the others that may contain a part of the body;
 /// the middles of the cells are set in both, the shares in the second.
+/// @param cell  made larger where coordinates do not resolve it
 template <class Whole, class Cut>
-void for_blocks_of(const FieldView& field, double cell, const Whole& whole, const Cut& cut) {
+void for_blocks_of(const FieldView& field, double& cell, const Whole& whole, const Cut& cut) {
   SUPPLE_EXPECTS(cell > 0.0);
   Box box = field.surface_box();
   if (box.empty()) return;
   SUPPLE_EXPECTS(box.lower.allFinite() && box.upper.allFinite());
+  cell = std::max(cell, kLeastCell * std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff()));
   const Vec3 around = Vec3::Constant(kShift * cell);
   box = {box.lower - around, box.upper + around};
   const double edge = kEdge * cell;
   Block block;
   CutBlock near_surface;
-  using Place = Eigen::Matrix<std::int64_t, 3, 1>;
-  const Place first = (box.lower / edge).array().floor().cast<std::int64_t>(), last = (box.upper / edge).array().floor().cast<std::int64_t>();
-  for (std::int64_t z = first.z(); z <= last.z(); ++z) {
-    for (std::int64_t y = first.y(); y <= last.y(); ++y) {
-      for (std::int64_t x = first.x(); x <= last.x(); ++x) {
-        const Vec3 corner = edge * Place(x, y, z).cast<double>();
-        const Box reach{corner - around, corner + Vec3::Constant(edge) + around};
-        const Interval bound = field.bound(reach);
-        if (bound.upper < 0.0) continue;
-        for (std::size_t i = 0; i < kCells; ++i) {
-          const auto k = static_cast<int>(i);
-          block.points[i] = corner + cell * (Vec3(k % kEdge, k / kEdge % kEdge, k / (kEdge * kEdge)) + Vec3::Constant(0.5));
-        }
-        if (bound.lower > 0.0) {
-          whole(block);
-          continue;
-        }
-        const Vec3 steps = Vec3::Constant(kReach * cell);
-        near_surface.measure(field, cell, field.gradient_bound({corner - steps, corner + Vec3::Constant(edge) + steps}), block);
-        cut(block);
-      }
+  const auto box_of = [&](const Place& first, const Place& last) {
+    return Box{edge * first.cast<double>() - around, edge * (last.array() + 1).matrix().cast<double>() + around};
+  };
+  const auto reaches = [&](const Place& first, const Place& last) {
+    heed_scope();
+    return !(field.bound(box_of(first, last)).upper < 0.0);
+  };
+  const auto visit = [&](const Place& place) {
+    const Vec3 corner = edge * place.cast<double>();
+    for (std::size_t i = 0; i < kCells; ++i) {
+      const auto k = static_cast<int>(i);
+      block.points[i] = corner + cell * (Vec3(k % kEdge, k / kEdge % kEdge, k / (kEdge * kEdge)) + Vec3::Constant(0.5));
     }
-  }
+    if (field.bound(box_of(place, place)).lower > 0.0) return whole(block);
+    const Vec3 steps = Vec3::Constant(kReach * cell);
+    near_surface.measure(field, cell, field.gradient_bound({corner - steps, corner + Vec3::Constant(edge) + steps}), block);
+    cut(block);
+  };
+  const auto place_of = [&](const Vec3& point) { return Place((point / edge).array().floor().cast<std::int64_t>()); };
+  for_places(place_of(box.lower), place_of(box.upper), reaches, visit);
 }
 
 /// How the parts of a row share a cell: each has what lies on its side of the planes where it is as strong as the strongest other

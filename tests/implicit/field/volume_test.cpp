@@ -145,6 +145,20 @@ TEST(Volume, OfBlendedPairsIsThatOfTheirDiscs) {
   }
 }
 
+TEST(Volume, OfBallsFarApartTakesTheCellsOfTheBallsOnly) {
+  // The box around them holds 1e22 cells; coordinates resolve a cell to 1e-9 of it.
+  const double size = 5e-7;
+  const Body body = body_of({{wyvill_point(size), Vec3::Zero()}, {wyvill_point(size), Vec3(1, 0.3, 0)}, {wyvill_point(size), Vec3(0, -1, 1)}});
+  const double r = iso_distance(Kernel::wyvill(size), 0.5);
+  EXPECT_NEAR(enclosed_volume(body.field, r / 6.0) / (4.0 * kPi * r * r * r), 1.0, promised(1.0, 6.0) + 1e-7);
+  for (const double part : part_volumes(body.field, r / 6.0, 3)) EXPECT_NEAR(part / (4.0 / 3.0 * kPi * r * r * r), 1.0, promised(1.0, 6.0) + 1e-7);
+}
+
+TEST(Volume, CellsThatCoordinatesDoNotResolveAreLarger) {
+  const Body body = body_of({{wyvill_point(1e-40), Vec3(1, 0, 0)}});
+  EXPECT_EQ(enclosed_volume(body.field, 1e-41), 0.0);
+}
+
 TEST(Volume, WithoutASurfaceIsZero) {
   Body body = body_of({{wyvill_point(1.0), Vec3::Zero()}});
   body.skeleton.iso = 1.5;

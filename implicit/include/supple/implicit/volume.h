@@ -17,7 +17,9 @@ namespace supple::implicit {
 /// the tangent plane at the foot point of their centre, with a correction for curvature. Exact for planes; relative to
 /// the volume it errs by about a third of (cell / radius of curvature)^4, the same for every kernel; second order at creases.
 /// Changes smoothly while the surface moves.
-/// @param cell  [m], > 0; where the support ends closer to the surface than a cell, the cells beyond are unknown
+/// Takes time by the cells of the body, not by those of the box around it.
+/// @param cell  [m], > 0; where the support ends closer to the surface than a cell, the cells beyond are unknown; less than 1e-12 of
+/// the largest coordinate counts as that
 /// @pre the surface box is bounded
 [[nodiscard]] double enclosed_volume(const FieldView& field, double cell);
 
