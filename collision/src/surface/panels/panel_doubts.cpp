@@ -87,7 +87,7 @@ void Pass::look_between(Panel& panel, std::size_t k, double most) const {
   }
   if (!(below > 0.0)) return;
   const double area = width_of(panel, 0) * width_of(panel, 1) * below / (below - least);
-  if (area > most) part(panel, longer(panel));
+  if (area > most) part_longer(s_.chart, panel);
   panel.missed_area += area;
   panel.missed_load += below * area / 3.0;
 }
@@ -202,7 +202,7 @@ void Pass::judge_panel(std::size_t k, const Plane& rough) {
   if (most > 0.0) part(panel, out, hidden.place);
   const bool told = s_.chart.star() && judge_slots(k, most);
   if (!told) judge_sides(k, most);
-  if (panel.points.size() > 0 && !(most > 0.0)) part(panel, rough[0] >= rough[1] ? panel.inner : out);
+  if (panel.points.size() > 0 && !(most > 0.0)) part_middle(panel, rough[0] >= rough[1] ? panel.inner : out);
   if (!told && panel.points.size() > 0) judge_corners(k, most);
 }
 

@@ -24,7 +24,8 @@ inline void part(Panel& panel, std::size_t coordinate, double place) {
   panel.parting = static_cast<std::uint8_t>(coordinate);
   panel.parting_place = place;
 }
-inline void part(Panel& panel, std::size_t coordinate) { part(panel, coordinate, low_of(panel, coordinate) + 0.5 * width_of(panel, coordinate)); }
+
+inline void part_middle(Panel& panel, std::size_t coordinate) { part(panel, coordinate, low_of(panel, coordinate) + 0.5 * width_of(panel, coordinate)); }
 
 /// One pass over panels with a rule of one order.
 class Pass {
@@ -67,7 +68,6 @@ class Pass {
   void look_aside(Panel& panel, std::size_t k, std::size_t in, bool upper, double& most) const;
   void look_between(Panel& panel, std::size_t k, double most) const;
   void evaluate(std::span<const SigmaRay> rays);
-  [[nodiscard]] std::size_t longer(const Panel& panel) const;
   [[nodiscard]] double stretch_of(const Panel& panel) const { return s_.chart.stretch({low_of(panel, 0) + 0.5 * width_of(panel, 0), low_of(panel, 1) + 0.5 * width_of(panel, 1)}); }
   void look_across(std::size_t k, std::size_t row, std::size_t stride);
   void look_beside(std::size_t k, std::size_t rim, std::size_t row, std::size_t stride);

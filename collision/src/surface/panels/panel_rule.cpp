@@ -77,13 +77,15 @@ class PanelSolver {
   [[nodiscard]] Vec3 middle_of(const Panel& panel) const;
   [[nodiscard]] bool crosses(const implicit::Kink& kink, const Panel& panel) const;
   void measure(std::size_t first);
-  void look_for_starts(Panel& panel) const;
+  void look_for_starts(Panel& panel);
+  [[nodiscard]] double most_of_starts(const Panel& panel) const;
+  void settle_starts();
   void look_for_imprints(Panel& panel) const;
   void look_for_free_places(Panel& panel) const;
   [[nodiscard]] double estimate();
   [[nodiscard]] double error_of(const Panel& panel) const;
   [[nodiscard]] double energy_scale() const;
-  bool choose();
+  bool choose(double estimated);
   void refine();
   void split(const Panel& panel, std::size_t axis, double place, bool walls);
   [[nodiscard]] bool try_to_cut(Panel& panel);
@@ -96,6 +98,7 @@ class PanelSolver {
   PanelSetting setting_;
   bool graph_ = true;
   bool kinks_known_ = false;
+  bool starts_settled_ = false;
   PatchSums all_;
   double energy_ = 1.0;  // that errors of fluxes are measured against [J]
 };
@@ -387,11 +390,8 @@ void PanelSolver::measure(std::size_t first) {
   }
 }
 
-/// A panel without points that holds a place where the bodies press misses something, unless a third body may have it.
-void PanelSolver::look_for_starts(Panel& panel) const {
-  for (std::uint32_t l = panel.levels.begin; l < panel.levels.end; ++l) {
-    if (setting_.levels.is_third(r_.arena.level[l])) return;
-  }
+/// How hard the bodies press on Sigma at most near the starts that a panel holds [Pa].
+double PanelSolver::most_of_starts(const Panel& panel) const {
   double most = 0.0;
   for (std::size_t i = 0; i < r_.start.size(); ++i) {
     bool within = true;
@@ -401,12 +401,47 @@ void PanelSolver::look_for_starts(Panel& panel) const {
     }
     if (within) most = std::max(most, r_.start_pressure[i]);
   }
+  return most;
+}
+
+/// Moves starts to Sigma by Newton's method, and leaves out those that end where, to first order, the bodies do not press on it: a part of a body deep in the
+/// other one may have Sigma beside it only, or none.
+void PanelSolver::settle_starts() {
+  starts_settled_ = true;
+  PressureBatch& batch = r_.batch;
+  batch.resize(r_.start.size());
+  for (std::size_t i = 0; i < r_.start.size(); ++i) batch.point[i] = setting_.view.frame.world(r_.start[i]);
+  job_.pressure.evaluate(batch);
+  move_to_sigma(batch);
+  r_.start.clear();
+  r_.start_pressure.clear();
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const double off = std::abs(batch.a[i] - batch.b[i]) / (batch.slope_b[i] - batch.slope_a[i]).norm();
+    const double most = std::min(batch.a[i] + off * batch.slope_a[i].norm(), batch.b[i] + off * batch.slope_b[i].norm());
+    if (most < 0.0) continue;
+    r_.start.push_back(setting_.view.frame.local(batch.point[i]));
+    r_.start_pressure.push_back(most);
+  }
+}
+
+/// A panel without points that holds a place where the bodies press misses something, unless a third body may have it.
+void PanelSolver::look_for_starts(Panel& panel) {
+  for (std::uint32_t l = panel.levels.begin; l < panel.levels.end; ++l) {
+    if (setting_.levels.is_third(r_.arena.level[l])) return;
+  }
+  double most = most_of_starts(panel);
+  if (!(most > 0.0)) return;
+  if (!starts_settled_) {
+    settle_starts();
+    most = most_of_starts(panel);
+  }
   if (!(most > 0.0)) return;
   const double across = panel.high[static_cast<std::size_t>(first_across(panel.along))] - panel.low[static_cast<std::size_t>(first_across(panel.along))];
   const double along = panel.high[static_cast<std::size_t>(second_across(panel.along))] - panel.low[static_cast<std::size_t>(second_across(panel.along))];
   const double area = across * along / (setting_.order * setting_.order);  // what a node stands for
   panel.missed_area = std::max(panel.missed_area, area);
   panel.missed_load = std::max(panel.missed_load, most * area / 3.0);
+  part_longer(setting_.chart, panel);
 }
 
 /// A panel of a star without points that holds a place where the pair presses harder than third bodies misses something. Where none of its rays leads to such a place, these
@@ -489,25 +524,36 @@ double PanelSolver::estimate() {
   return kTwoOrders * std::max({force, area, first, energy});
 }
 
-/// Moves the panels that err most to `chosen`; what the others err by is a share of what is asked. @return whether there are such
-bool PanelSolver::choose() {
+/// Moves the panels that err most to `chosen`. What the others err by is a share of what is asked, and less than now by as much as the estimate is to become
+/// smaller, so that the last panels are not refined one by one. @return false where there are none, or those that are split no more err by too much
+bool PanelSolver::choose(double estimated) {
+  constexpr double kOfUnmet = 0.9;  // beyond what would meet the error just so
   std::vector<std::uint32_t>& order = r_.order;
   order.clear();
   r_.value.resize(r_.panel.size());
-  for (std::size_t i = 0; i < r_.panel.size(); ++i) {
-    r_.value[i] = error_of(r_.panel[i]);
-    if (r_.value[i] > 0.0 && r_.panel[i].depth < kMostDepth) order.push_back(static_cast<std::uint32_t>(i));
-  }
-  std::sort(order.begin(), order.end(), [&](std::uint32_t p, std::uint32_t q) { return r_.value[p] != r_.value[q] ? r_.value[p] < r_.value[q] : p < q; });
-  double square = 0.0, sum = 0.0;
-  std::size_t kept = 0;
-  for (; kept < order.size(); ++kept) {
-    const double e = r_.value[order[kept]];
+  double square = 0.0, sum = 0.0, all = 0.0, left_as_they_are = 0.0;
+  // Errors of one sign add up, others cancel: between the two.
+  const auto add = [&](double e) {
     square += e * e;
     sum += e;
-    // Errors of one sign add up, others cancel: between the two.
-    if (std::sqrt(std::sqrt(square) * sum) > kOfKept / kTwoOrders * job_.error) break;
+    return std::sqrt(std::sqrt(square) * sum);
+  };
+  for (std::size_t i = 0; i < r_.panel.size(); ++i) {
+    r_.value[i] = error_of(r_.panel[i]);
+    if (!(r_.value[i] > 0.0)) continue;
+    if (r_.panel[i].depth >= kMostDepth) {
+      left_as_they_are = std::hypot(left_as_they_are, r_.value[i]);
+      continue;
+    }
+    order.push_back(static_cast<std::uint32_t>(i));
+    all = add(r_.value[i]);
   }
+  if (kTwoOrders * left_as_they_are > job_.error) return false;
+  const double most = std::min(kOfKept / kTwoOrders * job_.error, kOfUnmet * all * job_.error / estimated);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t p, std::uint32_t q) { return r_.value[p] != r_.value[q] ? r_.value[p] < r_.value[q] : p < q; });
+  square = sum = 0.0;
+  std::size_t kept = 0;
+  while (kept < order.size() && !(add(r_.value[order[kept]]) > most)) ++kept;
   if (kept == order.size()) {
     if (order.empty()) return false;
     --kept;
@@ -672,7 +718,7 @@ bool PanelSolver::solve(PatchPoints& points, PanelOutcome& out) {
   const bool star = job_.star != nullptr;
   const auto fits = [&] { return !star || std::none_of(r_.panel.begin(), r_.panel.end(), [](const Panel& panel) { return panel.open || panel.steep; }); };
   const std::size_t most = star ? kMostOfStar : kMostPanels;
-  for (out.estimate = estimate(); fits() && out.estimate > job_.error && r_.panel.size() < most && choose(); out.estimate = estimate()) refine();
+  for (out.estimate = estimate(); fits() && out.estimate > job_.error && r_.panel.size() < most && choose(out.estimate); out.estimate = estimate()) refine();
   if (!fits()) return false;
   const bool taken = star && out.estimate == 0.0 && !(all_.load > 0.0);
   if (!taken && (!(all_.load > 0.0) || (job_.graph_only && !has_one_sheet()))) return false;

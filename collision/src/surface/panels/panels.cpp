@@ -51,13 +51,6 @@ void Pass::evaluate(std::span<const SigmaRay> rays) {
   for (std::size_t i = 0; i < a_.query.size(); ++i) a_.value[i].slope = s_.chart.slopes(rays[a_.query[i].ray].place, a_.value[i].slope);
 }
 
-/// The coordinate along which the panel is longer, as places in the plane lie.
-std::size_t Pass::longer(const Panel& panel) const {
-  const Plane middle{low_of(panel, 0) + 0.5 * width_of(panel, 0), low_of(panel, 1) + 0.5 * width_of(panel, 1)};
-  const Plane u = s_.chart.slopes(middle, {1.0, 0.0}), v = s_.chart.slopes(middle, {0.0, 1.0});
-  return width_of(panel, 0) * std::hypot(u[0], v[0]) >= width_of(panel, 1) * std::hypot(u[1], v[1]) ? 0 : 1;
-}
-
 /// From the nearest ray that is known.
 SigmaRay Pass::start_ray(const Panel& panel, const Plane& place, std::span<const SigmaRay> near) const {
   SigmaRay ray;
@@ -113,7 +106,7 @@ void Pass::look_at_lattice() {
       for (const std::size_t c : {0u, 1u}) change[c] += std::abs(slope[c]) * width_of(panel, c);
     }
     panel.inner = !s_.chart.star() && change[0] >= change[1] ? 0 : 1;
-    part(panel, longer(panel));
+    part_longer(s_.chart, panel);
     panel.nodes = {static_cast<std::uint32_t>(a_.node.size()), static_cast<std::uint32_t>(a_.node.size() + rays.size())};
     a_.node.insert(a_.node.end(), rays.begin(), rays.end());
   }
@@ -512,6 +505,14 @@ void Pass::add_up(bool first) {
 }
 
 }  // namespace panel_pass
+
+void part_longer(const PlaneChart& chart, Panel& panel) {
+  using panel_pass::low_of, panel_pass::width_of;
+  const panel_pass::Plane middle{low_of(panel, 0) + 0.5 * width_of(panel, 0), low_of(panel, 1) + 0.5 * width_of(panel, 1)};
+  const panel_pass::Plane u = chart.slopes(middle, {1.0, 0.0}), v = chart.slopes(middle, {0.0, 1.0});
+  const bool first = width_of(panel, 0) * std::hypot(u[0], v[0]) >= width_of(panel, 1) * std::hypot(u[1], v[1]);
+  panel_pass::part_middle(panel, first ? 0 : 1);
+}
 
 void measure_panels(PanelSetting& setting, std::span<Panel> panels, std::span<const std::uint32_t> which, PanelArena& arena) {
   std::vector<std::uint32_t>& rest = arena.compared;

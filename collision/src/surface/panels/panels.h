@@ -148,6 +148,9 @@ struct PanelArena {
   }
 };
 
+/// A panel is to be split in the middle of its longer side, as places in the plane lie.
+void part_longer(const PlaneChart& chart, Panel& panel);
+
 /// Fills sums, errors and points of the panels `which`.
 void measure_panels(PanelSetting& setting, std::span<Panel> panels, std::span<const std::uint32_t> which, PanelArena& arena);
 
