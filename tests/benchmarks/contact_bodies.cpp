@@ -74,6 +74,28 @@ Parts jelly(int columns, int layers) {
   return parts;
 }
 
+/// A body such as fits make: ellipsoids of many sizes, each near an earlier one.
+Parts limbs(std::uint32_t count) {
+  constexpr double kLeast = 0.04, kMost = 0.2, kLongest = 3.0, kApart = 0.3;  // supports [m], long over thin, and between middles over the size
+  Draw draw(count);
+  implicit::Skeleton skeleton;
+  skeleton.part_count = count;
+  std::vector<Pose> pose;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    implicit::Primitive& p = skeleton.primitive.emplace_back();
+    p.part = k;
+    p.shape = implicit::ShapeKind::Ellipsoid;
+    const double size = draw.logarithmic(kLeast, kMost);
+    p.size = size * Vec3(1.0, draw.uniform(1.0, kLongest), draw.uniform(1.0, kLongest));
+    p.kernel = implicit::Kernel::wyvill(1.0);
+    const Vec3 beside = k == 0 ? Vec3::Zero().eval() : Vec3(pose[static_cast<std::size_t>(draw.uniform(0.0, k))].position + kApart * p.size.maxCoeff() * draw.direction());
+    pose.push_back({beside, draw.rotation()});
+  }
+  Parts parts(std::move(skeleton), 0.012);
+  parts.pose = std::move(pose);
+  return parts;
+}
+
 struct Line {
   std::vector<double> cpu, forces, error, estimate, points, evaluations;
   int missed = 0, over = 0;
@@ -200,6 +222,11 @@ int supple::benchmarks::programs::contact_bodies(int argc, char** argv) {
     }
     parts.index();
   };
+  const auto support = [](std::string_view under) {
+    const double aside = under == "edge" ? -0.4 : 0.0;
+    return implicit::SolidBox(Pose{Vec3(aside, 0.0, -0.2), Quat::Identity()}, Vec3(0.4, 0.4, 0.2), 0.01, 1.0);
+  };
+  const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
   for (const int columns : {2, 4, 8}) {
     const std::string count = std::to_string(columns * columns * 4);
     for (const std::string_view under : {"box", "plane", "edge"}) {
@@ -207,9 +234,7 @@ int supple::benchmarks::programs::contact_bodies(int argc, char** argv) {
       if (!wanted(name)) continue;
       Parts parts = jelly(columns, 4);
       const std::vector<Pose> rest = parts.pose;
-      implicit::SolidBox box(Pose{Vec3(0.0, 0.0, -0.2), Quat::Identity()}, Vec3(0.4, 0.4, 0.2), 0.01, 1.0);
-      if (under == "edge") box = implicit::SolidBox(Pose{Vec3(-0.4, 0.0, -0.2), Quat::Identity()}, Vec3(0.4, 0.4, 0.2), 0.01, 1.0);
-      const implicit::HalfSpace plane{Vec3::Zero(), Vec3::UnitZ(), 1.0};
+      const implicit::SolidBox box = support(under);
       measure(name, poses, rule, seed, reference, [&](Draw& draw) {
         laid(parts, rest, draw, 0.0);
         return std::array<collision::ContactBody, 2>{parts.body(), under == "plane" ? obstacle(plane) : obstacle(box)};
@@ -224,6 +249,28 @@ int supple::benchmarks::programs::contact_bodies(int argc, char** argv) {
       lower.index();
       laid(upper, rest, draw, 0.0);
       return std::array<collision::ContactBody, 2>{upper.body(), lower.body()};
+    });
+  }
+  for (const std::string_view under : {"box", "plane", "edge"}) {
+    constexpr double kDeepest = 0.03;
+    const std::string name = "limbs_32_on_" + std::string(under);
+    if (!wanted(name)) continue;
+    Parts parts = limbs(32);
+    const std::vector<Pose> rest = parts.pose;
+    const implicit::SolidBox box = support(under);
+    measure(name, poses, rule, seed, reference, [&](Draw& draw) {
+      const Quat turn = draw.rotation();
+      const auto place = [&](const Vec3& aside) {
+        for (std::size_t k = 0; k < rest.size(); ++k) parts.pose[k] = {turn * rest[k].position + aside, turn * rest[k].orientation};
+        parts.index();
+      };
+      place(Vec3::Zero());
+      Vec3 lowest = Vec3::Zero();
+      for (std::size_t i = 0; i < parts.samples.point.size(); ++i) {
+        if (parts.samples.valid[i] != 0 && parts.samples.point[i].z() < lowest.z()) lowest = parts.samples.point[i];
+      }
+      place(Vec3(draw.uniform(-0.02, 0.02), draw.uniform(-0.02, 0.02), -draw.logarithmic(0.05, 1.0) * kDeepest) - lowest);
+      return std::array<collision::ContactBody, 2>{parts.body(), under == "plane" ? obstacle(plane) : obstacle(box)};
     });
   }
   return 0;

@@ -1,12 +1,57 @@
 /// What the panels of a pass may hold beside what their lines tell, and where they would be split for it.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "numbers.h"
 #include "surface/accuracy.h"
 #include "surface/panels/panel_pass.h"
 
 namespace supple::collision::panel_pass {
+
+/// Where a third body's level, or the pressure, seems to turn near zero between two places of a line: what it is there.
+void Pass::look_at_turns() {
+  constexpr double kNear = 0.5;  // of the nearer value beside it
+  std::size_t begin = 0;
+  a_.cut_ray.clear();
+  std::vector<PanelArena::Turn>& found = a_.near_zero;
+  found.clear();
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    const Panel& panel = panels_[which_[k]];
+    const std::size_t count = panel.levels.size();
+    for (std::size_t j = 0; j < n_; ++j) {
+      const auto index = static_cast<std::uint32_t>(k * n_ + j);
+      for (std::size_t l = 0; l < count && !a_.line[index].dead; ++l) {
+        const std::uint16_t level = a_.level[panel.levels.begin + l];
+        if (s_.levels.is_kink(level) || (s_.chart.star() && !s_.levels.is_third(level))) continue;
+        sample_line(index, level, begin + l, count, at_rim(index, l));
+        for (std::size_t i = 0; i + 1 < a_.sample.size(); ++i) {
+          const std::optional<LevelSample> turn = turn_between(a_.sample[i], a_.sample[i + 1]);
+          const double side = a_.sample[i].value > 0.0 ? 1.0 : -1.0;
+          if (!turn || side * turn->value > kNear * side * (std::abs(a_.sample[i].value) < std::abs(a_.sample[i + 1].value) ? a_.sample[i] : a_.sample[i + 1]).value) continue;
+          found.push_back({index, level, *turn});
+          Plane at = a_.line[index].base;
+          at[panel.inner] = turn->place;
+          a_.cut_ray.push_back(start_ray(panel, at, lattice_of(index)));
+        }
+      }
+    }
+    begin += n_ * n_ * count;
+  }
+  if (found.empty()) return;
+  lift(s_.view, a_.cut_ray, s_.enough, a_.rays);
+  a_.query.clear();
+  for (std::size_t i = 0; i < found.size(); ++i) a_.query.push_back({static_cast<std::uint32_t>(i), found[i].level, {}});
+  std::vector<LevelValue> lattice = std::move(a_.value);
+  evaluate(a_.cut_ray);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!a_.cut_ray[i].found) continue;
+    const std::size_t inner = panels_[a_.line[found[i].line].panel].inner;
+    found[i].sample = {a_.cut_ray[i].place[inner], a_.value[i].value, a_.value[i].slope[inner]};
+    a_.turn.push_back(found[i]);
+  }
+  a_.value = std::move(lattice);
+}
 
 /// What may press beyond an outermost line that does not, by parabolas from its nodes to the side of the panel, and in its corners.
 void Pass::look_beyond(Panel& panel, std::size_t k, bool upper, double& most) const {
@@ -204,6 +249,31 @@ void Pass::judge_panel(std::size_t k, const Plane& rough) {
   if (!told) judge_sides(k, most);
   if (panel.points.size() > 0 && !(most > 0.0)) part_middle(panel, rough[0] >= rough[1] ? panel.inner : out);
   if (!told && panel.points.size() > 0) judge_corners(k, most);
+}
+
+/// Where the patch goes on beyond the panel: at the ends of lines that a side cuts off, and between what the ends of the outermost lines drift to.
+void Pass::note_crossings(const Panel& panel) {
+  const std::size_t out = 1 - panel.inner;
+  const auto add = [&](double along, double across) {
+    Plane place{};
+    place[panel.inner] = along;
+    place[out] = across;
+    a_.crossing.push_back({place, panel.nodes});
+  };
+  for (std::size_t j = 0; j < n_; ++j) {
+    const LineShape& line = a_.shape[j];
+    for (const LineEnd& end : line.ends) {
+      if (end.level == LineEnd::kSide) add(end.place, line.at);
+    }
+    for (const bool upper : {false, true}) {
+      if (j != (upper ? n_ - 1 : 0)) continue;
+      const double side = low_of(panel, out) + (upper ? width_of(panel, out) : 0.0), way = side - line.at;
+      for (std::size_t i = 0; i + 1 < line.ends.size(); i += 2) {
+        const double enters = line.ends[i].place + way * line.ends[i].drift, leaves = line.ends[i + 1].place + way * line.ends[i + 1].drift;
+        if (leaves > enters) add(0.5 * (enters + leaves), side);
+      }
+    }
+  }
 }
 
 /// Where lines do not say what lies beside them: the nodes of the lattice do.

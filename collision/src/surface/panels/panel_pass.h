@@ -51,7 +51,7 @@ class Pass {
   }
   /// The rays of the panel that a line belongs to.
   [[nodiscard]] std::span<const SigmaRay> lattice_of(std::uint32_t line) const { return std::span<const SigmaRay>(a_.ray).subspan((line / n_) * n_ * n_, n_ * n_); }
-  [[nodiscard]] SigmaRay start_ray(const Panel& panel, const Plane& place, std::span<const SigmaRay> near) const;
+  [[nodiscard]] SigmaRay start_ray(const Panel& panel, const Plane& place, std::span<const SigmaRay> near) const { return collision::start_ray(s_.chart, panel, place, near); }
   /// A ray of the lattice as far as it tells what is beside it.
   struct Node {
     Plane at;
@@ -86,6 +86,7 @@ class Pass {
   void cut_line(std::uint32_t line);
   void add_piece(std::uint32_t line, double begin, double end);
   void judge_panel(std::size_t k, const Plane& rough);
+  void note_crossings(const Panel& panel);
   bool judge_slots(std::size_t k, double& most);
   void judge_sides(std::size_t k, double& most);
   void judge_corners(std::size_t k, double& most);

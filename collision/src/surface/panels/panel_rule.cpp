@@ -80,6 +80,7 @@ class PanelSolver {
   void look_for_starts(Panel& panel);
   [[nodiscard]] double most_of_starts(const Panel& panel) const;
   void settle_starts();
+  bool look_across_sides();
   void look_for_imprints(Panel& panel) const;
   void look_for_free_places(Panel& panel) const;
   [[nodiscard]] double estimate();
@@ -424,6 +425,42 @@ void PanelSolver::settle_starts() {
   }
 }
 
+/// Whether a panel without points lies beside one whose patch goes on across their common side, which a ray there confirms: such places become starts.
+bool PanelSolver::look_across_sides() {
+  using Crossing = PanelArena::Crossing;
+  std::vector<Crossing>& crossings = r_.arena.crossing;
+  std::sort(crossings.begin(), crossings.end(), [](const Crossing& p, const Crossing& q) { return p.place < q.place; });
+  std::vector<SigmaRay>& rays = r_.arena.cut_ray;
+  std::vector<std::uint32_t>& holder = r_.which;
+  rays.clear();
+  holder.clear();
+  for (std::uint32_t i = 0; i < r_.panel.size(); ++i) {
+    const Panel& panel = r_.panel[i];
+    if (panel.points.size() > 0 || panel.missed_load > 0.0 || panel.walls) continue;
+    const auto u = static_cast<std::size_t>(first_across(panel.along)), v = static_cast<std::size_t>(second_across(panel.along));
+    auto crossing = std::lower_bound(crossings.begin(), crossings.end(), panel.low[u], [](const Crossing& c, double low) { return c.place[0] < low; });
+    for (; crossing != crossings.end() && crossing->place[0] <= panel.high[u]; ++crossing) {
+      if (crossing->place[1] < panel.low[v] || crossing->place[1] > panel.high[v]) continue;
+      rays.push_back(start_ray(setting_.chart, panel, crossing->place, std::span(r_.arena.node).subspan(crossing->near.begin, crossing->near.size())));
+      holder.push_back(i);
+    }
+  }
+  if (rays.empty()) return false;
+  lift(setting_.view, rays, setting_.enough, r_.arena.rays);
+  if (!starts_settled_) settle_starts();
+  for (const SigmaRay& ray : rays) {
+    if (!ray.found || !(ray.pressure > 0.0)) continue;
+    r_.start.push_back(ray.local(ray.height));
+    r_.start_pressure.push_back(ray.pressure);
+  }
+  bool any = false;
+  for (const std::uint32_t i : holder) {
+    look_for_starts(r_.panel[i]);
+    any = any || r_.panel[i].missed_load > 0.0;
+  }
+  return any;
+}
+
 /// A panel without points that holds a place where the bodies press misses something, unless a third body may have it.
 void PanelSolver::look_for_starts(Panel& panel) {
   for (std::uint32_t l = panel.levels.begin; l < panel.levels.end; ++l) {
@@ -718,7 +755,9 @@ bool PanelSolver::solve(PatchPoints& points, PanelOutcome& out) {
   const bool star = job_.star != nullptr;
   const auto fits = [&] { return !star || std::none_of(r_.panel.begin(), r_.panel.end(), [](const Panel& panel) { return panel.open || panel.steep; }); };
   const std::size_t most = star ? kMostOfStar : kMostPanels;
-  for (out.estimate = estimate(); fits() && out.estimate > job_.error && r_.panel.size() < most && choose(out.estimate); out.estimate = estimate()) refine();
+  do {
+    for (out.estimate = estimate(); fits() && out.estimate > job_.error && r_.panel.size() < most && choose(out.estimate); out.estimate = estimate()) refine();
+  } while (fits() && out.estimate <= job_.error && look_across_sides());
   if (!fits()) return false;
   const bool taken = star && out.estimate == 0.0 && !(all_.load > 0.0);
   if (!taken && (!(all_.load > 0.0) || (job_.graph_only && !has_one_sheet()))) return false;

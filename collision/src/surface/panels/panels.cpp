@@ -51,29 +51,6 @@ void Pass::evaluate(std::span<const SigmaRay> rays) {
   for (std::size_t i = 0; i < a_.query.size(); ++i) a_.value[i].slope = s_.chart.slopes(rays[a_.query[i].ray].place, a_.value[i].slope);
 }
 
-/// From the nearest ray that is known.
-SigmaRay Pass::start_ray(const Panel& panel, const Plane& place, std::span<const SigmaRay> near) const {
-  SigmaRay ray;
-  ray.place = place;
-  ray.at = s_.chart.at(place);
-  const Plane& at = ray.at;
-  ray.along = panel.along;
-  ray.reverse = panel.reverse;
-  const double low = panel.low[panel.along], high = panel.high[panel.along], margin = 0.5 * (high - low);
-  ray.low = low - margin;
-  ray.high = high + margin;
-  ray.height = 0.5 * (low + high);
-  double least = kInfinity;
-  for (const SigmaRay& other : near) {
-    if (!other.found || other.along != panel.along) continue;
-    const double du = at[0] - other.at[0], dv = at[1] - other.at[1], square = du * du + dv * dv;
-    if (square >= least) continue;
-    least = square;
-    ray.height = std::clamp(other.height + du * other.rise[0] + dv * other.rise[1], ray.low, ray.high);
-  }
-  return ray;
-}
-
 void Pass::place_lattice() {
   a_.ray.clear();
   for (const std::uint32_t p : which_) {
@@ -235,8 +212,8 @@ void Pass::predict() {
   if (s_.chart.star()) {
     predict_all(true);
     meet_rims();
-    look_at_turns();
   }
+  look_at_turns();
   predict_all(false);
 }
 
@@ -499,12 +476,35 @@ void Pass::add_up(bool first) {
     panel.points.end = static_cast<std::uint32_t>(a_.point.size());
     panel.sums = panel.off = sums;
     judge_panel(k, {along, std::abs(across[0]) + std::abs(across[1])});
+    if (!s_.chart.star() && !panel.walls) note_crossings(panel);
     panel.missed_area *= stretch_of(panel);
     panel.missed_load *= stretch_of(panel);
   }
 }
 
 }  // namespace panel_pass
+
+SigmaRay start_ray(const PlaneChart& chart, const Panel& panel, const PlaneChart::Place& place, std::span<const SigmaRay> near) {
+  SigmaRay ray;
+  ray.place = place;
+  ray.at = chart.at(place);
+  const PlaneChart::Place& at = ray.at;
+  ray.along = panel.along;
+  ray.reverse = panel.reverse;
+  const double low = panel.low[panel.along], high = panel.high[panel.along], margin = 0.5 * (high - low);
+  ray.low = low - margin;
+  ray.high = high + margin;
+  ray.height = 0.5 * (low + high);
+  double least = kInfinity;
+  for (const SigmaRay& other : near) {
+    if (!other.found || other.along != panel.along) continue;
+    const double du = at[0] - other.at[0], dv = at[1] - other.at[1], square = du * du + dv * dv;
+    if (square >= least) continue;
+    least = square;
+    ray.height = std::clamp(other.height + du * other.rise[0] + dv * other.rise[1], ray.low, ray.high);
+  }
+  return ray;
+}
 
 void part_longer(const PlaneChart& chart, Panel& panel) {
   using panel_pass::low_of, panel_pass::width_of;

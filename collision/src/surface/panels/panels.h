@@ -75,6 +75,12 @@ struct PanelArena {
   std::vector<SigmaRay> node;
   std::vector<std::uint16_t> level;
   std::vector<PanelPoint> point;
+  /// A place on a side of a panel where the patch goes on beyond it, as the panel's lines have it, and rays near it.
+  struct Crossing {
+    std::array<double, 2> place;
+    Slice near;
+  };
+  std::vector<Crossing> crossing;
 
   // Of one pass over panels.
   struct Line {
@@ -129,7 +135,7 @@ struct PanelArena {
     std::uint16_t level;
     LevelSample sample;
   };
-  std::vector<Turn> turn;
+  std::vector<Turn> turn, near_zero;
   std::vector<SigmaRay> rim_ray;
   std::vector<LevelValue> rim_value;
   std::vector<Search> rim_search;
@@ -145,8 +151,12 @@ struct PanelArena {
     node.clear();
     level.clear();
     point.clear();
+    crossing.clear();
   }
 };
+
+/// The ray of a panel at a place, from the nearest ray that is known.
+[[nodiscard]] SigmaRay start_ray(const PlaneChart& chart, const Panel& panel, const PlaneChart::Place& place, std::span<const SigmaRay> near);
 
 /// A panel is to be split in the middle of its longer side, as places in the plane lie.
 void part_longer(const PlaneChart& chart, Panel& panel);

@@ -1,4 +1,4 @@
-/// Where the lines of a star leave its patch, and where third bodies nearly come or go before.
+/// Where the lines of a star leave its patch, and what third bodies take of them before.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -6,49 +6,6 @@
 #include "surface/panels/panel_pass.h"
 
 namespace supple::collision::panel_pass {
-
-/// Where a third body's level seems to turn near zero between two places of a line: what it is there.
-void Pass::look_at_turns() {
-  constexpr double kNear = 0.5;  // of the nearer value beside it
-  std::size_t begin = 0;
-  a_.cut_ray.clear();
-  std::vector<PanelArena::Turn> found;
-  for (std::size_t k = 0; k < which_.size(); ++k) {
-    const Panel& panel = panels_[which_[k]];
-    const std::size_t count = panel.levels.size();
-    for (std::size_t j = 0; j < n_; ++j) {
-      const auto index = static_cast<std::uint32_t>(k * n_ + j);
-      for (std::size_t l = 0; l < count && !a_.line[index].dead; ++l) {
-        const std::uint16_t level = a_.level[panel.levels.begin + l];
-        if (!s_.levels.is_third(level)) continue;
-        sample_line(index, level, begin + l, count, at_rim(index, l));
-        for (std::size_t i = 0; i + 1 < a_.sample.size(); ++i) {
-          const std::optional<LevelSample> turn = turn_between(a_.sample[i], a_.sample[i + 1]);
-          const double side = a_.sample[i].value > 0.0 ? 1.0 : -1.0;
-          if (!turn || side * turn->value > kNear * side * (std::abs(a_.sample[i].value) < std::abs(a_.sample[i + 1].value) ? a_.sample[i] : a_.sample[i + 1]).value) continue;
-          found.push_back({index, level, *turn});
-          Plane at = a_.line[index].base;
-          at[panel.inner] = turn->place;
-          a_.cut_ray.push_back(start_ray(panel, at, lattice_of(index)));
-        }
-      }
-    }
-    begin += n_ * n_ * count;
-  }
-  if (found.empty()) return;
-  lift(s_.view, a_.cut_ray, s_.enough, a_.rays);
-  a_.query.clear();
-  for (std::size_t i = 0; i < found.size(); ++i) a_.query.push_back({static_cast<std::uint32_t>(i), found[i].level, {}});
-  std::vector<LevelValue> lattice = std::move(a_.value);
-  evaluate(a_.cut_ray);
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if (!a_.cut_ray[i].found) continue;
-    const std::size_t inner = panels_[a_.line[found[i].line].panel].inner;
-    found[i].sample = {a_.cut_ray[i].place[inner], a_.value[i].value, a_.value[i].slope[inner]};
-    a_.turn.push_back(found[i]);
-  }
-  a_.value = std::move(lattice);
-}
 
 /// A level of a panel where a line of a star leaves the patch.
 std::optional<LevelSample> Pass::at_rim(std::uint32_t index, std::size_t level) const {
