@@ -9,6 +9,18 @@
 
 namespace supple::collision::panel_pass {
 
+/// Whether slopes at neighbouring rays of a line lead towards zero, and back.
+bool Pass::may_turn(std::uint32_t index, std::size_t row, std::size_t stride) const {
+  const PanelArena::Line& line = a_.line[index];
+  const std::size_t first = line.first - (index / n_) * n_ * n_, inner = panels_[line.panel].inner;
+  const auto value = [&](std::size_t i) -> const LevelValue& { return a_.value[row + (first + i * line.stride) * stride]; };
+  for (std::size_t i = 0; i + 1 < n_; ++i) {
+    const double towards = value(i).value > 0.0 ? -1.0 : 1.0;
+    if (towards * value(i).slope[inner] > 0.0 && towards * value(i + 1).slope[inner] < 0.0) return true;
+  }
+  return false;
+}
+
 /// Where a third body's level, or the pressure, seems to turn near zero between two places of a line: what it is there.
 void Pass::look_at_turns() {
   constexpr double kNear = 0.5;  // of the nearer value beside it
@@ -23,7 +35,7 @@ void Pass::look_at_turns() {
       const auto index = static_cast<std::uint32_t>(k * n_ + j);
       for (std::size_t l = 0; l < count && !a_.line[index].dead; ++l) {
         const std::uint16_t level = a_.level[panel.levels.begin + l];
-        if (s_.levels.is_kink(level) || (s_.chart.star() && !s_.levels.is_third(level))) continue;
+        if (s_.levels.is_kink(level) || (s_.chart.star() && !s_.levels.is_third(level)) || (!s_.chart.star() && !may_turn(index, begin + l, count))) continue;
         sample_line(index, level, begin + l, count, at_rim(index, l));
         for (std::size_t i = 0; i + 1 < a_.sample.size(); ++i) {
           const std::optional<LevelSample> turn = turn_between(a_.sample[i], a_.sample[i + 1]);
@@ -253,24 +265,25 @@ void Pass::judge_panel(std::size_t k, const Plane& rough) {
 
 /// Where the patch goes on beyond the panel: at the ends of lines that a side cuts off, and between what the ends of the outermost lines drift to.
 void Pass::note_crossings(const Panel& panel) {
-  const std::size_t out = 1 - panel.inner;
-  const auto add = [&](double along, double across) {
+  const std::size_t in = panel.inner, out = 1 - in;
+  const auto add = [&](double along, double across, double width, std::size_t beyond, bool upper) {
     Plane place{};
-    place[panel.inner] = along;
+    place[in] = along;
     place[out] = across;
-    a_.crossing.push_back({place, panel.nodes});
+    a_.crossing.push_back({place, width, static_cast<std::uint8_t>(beyond), upper, panel.nodes});
   };
   for (std::size_t j = 0; j < n_; ++j) {
     const LineShape& line = a_.shape[j];
-    for (const LineEnd& end : line.ends) {
-      if (end.level == LineEnd::kSide) add(end.place, line.at);
-    }
-    for (const bool upper : {false, true}) {
-      if (j != (upper ? n_ - 1 : 0)) continue;
-      const double side = low_of(panel, out) + (upper ? width_of(panel, out) : 0.0), way = side - line.at;
-      for (std::size_t i = 0; i + 1 < line.ends.size(); i += 2) {
-        const double enters = line.ends[i].place + way * line.ends[i].drift, leaves = line.ends[i + 1].place + way * line.ends[i + 1].drift;
-        if (leaves > enters) add(0.5 * (enters + leaves), side);
+    for (std::size_t i = 0; i + 1 < line.ends.size(); i += 2) {
+      const LineEnd &enters = line.ends[i], &leaves = line.ends[i + 1];
+      const double strip = gauss_.weight[j] * width_of(panel, out);
+      if (enters.level == LineEnd::kSide) add(enters.place, line.at, strip, in, false);
+      if (leaves.level == LineEnd::kSide) add(leaves.place, line.at, strip, in, true);
+      for (const bool upper : {false, true}) {
+        if (j != (upper ? n_ - 1 : 0)) continue;
+        const double side = low_of(panel, out) + (upper ? width_of(panel, out) : 0.0), way = side - line.at;
+        const double from = enters.place + way * enters.drift, to = leaves.place + way * leaves.drift;
+        if (to > from) add(0.5 * (from + to), side, to - from, out, upper);
       }
     }
   }

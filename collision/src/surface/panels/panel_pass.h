@@ -75,6 +75,7 @@ class Pass {
   double negative_length(const Panel& panel, double limit);
   void hide(std::size_t k, double area, double load, double place);
   void sample_line(std::uint32_t line, std::uint16_t level, std::size_t row, std::size_t stride, const std::optional<LevelSample>& end);
+  [[nodiscard]] bool may_turn(std::uint32_t line, std::size_t row, std::size_t stride) const;
   void look_at_turns();
   void predict_line(std::uint32_t line, std::uint16_t level, std::size_t row, std::size_t stride, const std::optional<LevelSample>& end);
   void predict_all(bool rims);

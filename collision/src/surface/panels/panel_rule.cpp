@@ -80,6 +80,7 @@ class PanelSolver {
   void look_for_starts(Panel& panel);
   [[nodiscard]] double most_of_starts(const Panel& panel) const;
   void settle_starts();
+  [[nodiscard]] bool has_third(const Panel& panel) const;
   bool look_across_sides();
   void look_for_imprints(Panel& panel) const;
   void look_for_free_places(Panel& panel) const;
@@ -391,6 +392,11 @@ void PanelSolver::measure(std::size_t first) {
   }
 }
 
+bool PanelSolver::has_third(const Panel& panel) const {
+  const auto levels = std::span(r_.arena.level).subspan(panel.levels.begin, panel.levels.size());
+  return std::any_of(levels.begin(), levels.end(), [this](std::uint16_t level) { return setting_.levels.is_third(level); });
+}
+
 /// How hard the bodies press on Sigma at most near the starts that a panel holds [Pa].
 double PanelSolver::most_of_starts(const Panel& panel) const {
   double most = 0.0;
@@ -425,47 +431,81 @@ void PanelSolver::settle_starts() {
   }
 }
 
-/// Whether a panel without points lies beside one whose patch goes on across their common side, which a ray there confirms: such places become starts.
+/// Panels by the places of the plane that they may hold, in coarse cells.
+class PanelMap {
+ public:
+  PanelMap(std::span<const Panel> panels, std::span<const std::uint32_t> which) {
+    for (const std::uint32_t i : which) {
+      for (const std::size_t k : {0u, 1u}) {
+        low_[k] = std::min(low_[k], panels[i].low[k]);
+        high_[k] = std::max(high_[k], panels[i].high[k]);
+      }
+    }
+    for (const std::uint32_t i : which) {
+      const std::size_t end = cell(1, panels[i].high[1]);
+      const std::uint64_t columns = (~std::uint64_t{0} >> (kCells - 1 - cell(0, panels[i].high[0]))) & (~std::uint64_t{0} << cell(0, panels[i].low[0]));
+      for (std::size_t row = cell(1, panels[i].low[1]); row <= end; ++row) row_[row] |= columns;
+    }
+  }
+  [[nodiscard]] bool may_hold(const PlaneChart::Place& place) const {
+    const auto beyond = [&](std::size_t k) { return place[k] < low_[k] || place[k] > high_[k]; };
+    return !beyond(0) && !beyond(1) && ((row_[cell(1, place[1])] >> cell(0, place[0])) & 1) != 0;
+  }
+
+ private:
+  static constexpr std::size_t kCells = 64;
+  [[nodiscard]] std::size_t cell(std::size_t k, double at) const {
+    return static_cast<std::size_t>(std::clamp((at - low_[k]) / (high_[k] - low_[k]) * kCells, 0.0, kCells - 1.0));
+  }
+  PlaneChart::Place low_{kInfinity, kInfinity}, high_{-kInfinity, -kInfinity};
+  std::array<std::uint64_t, kCells> row_{};
+};
+
+/// Whether a panel without points lies beside one whose patch goes on across their common side, which a ray there confirms. What the panel misses is a triangle, as
+/// far as the pressure falls evenly.
 bool PanelSolver::look_across_sides() {
-  using Crossing = PanelArena::Crossing;
-  std::vector<Crossing>& crossings = r_.arena.crossing;
-  std::sort(crossings.begin(), crossings.end(), [](const Crossing& p, const Crossing& q) { return p.place < q.place; });
-  std::vector<SigmaRay>& rays = r_.arena.cut_ray;
-  std::vector<std::uint32_t>& holder = r_.which;
-  rays.clear();
-  holder.clear();
+  std::vector<std::uint32_t>& empty = r_.which;
+  empty.clear();
   for (std::uint32_t i = 0; i < r_.panel.size(); ++i) {
     const Panel& panel = r_.panel[i];
-    if (panel.points.size() > 0 || panel.missed_load > 0.0 || panel.walls) continue;
-    const auto u = static_cast<std::size_t>(first_across(panel.along)), v = static_cast<std::size_t>(second_across(panel.along));
-    auto crossing = std::lower_bound(crossings.begin(), crossings.end(), panel.low[u], [](const Crossing& c, double low) { return c.place[0] < low; });
-    for (; crossing != crossings.end() && crossing->place[0] <= panel.high[u]; ++crossing) {
-      if (crossing->place[1] < panel.low[v] || crossing->place[1] > panel.high[v]) continue;
-      rays.push_back(start_ray(setting_.chart, panel, crossing->place, std::span(r_.arena.node).subspan(crossing->near.begin, crossing->near.size())));
-      holder.push_back(i);
+    if (panel.points.size() == 0 && !(panel.missed_load > 0.0) && !panel.walls && !has_third(panel)) empty.push_back(i);
+  }
+  const PanelMap map(r_.panel, empty);
+  std::vector<SigmaRay>& rays = r_.arena.cut_ray;
+  std::vector<std::pair<Panel*, const PanelArena::Crossing*>> pairs;
+  rays.clear();
+  for (const PanelArena::Crossing& crossing : r_.arena.crossing) {
+    if (!map.may_hold(crossing.place)) continue;
+    for (const std::uint32_t i : empty) {
+      Panel& panel = r_.panel[i];
+      const auto within = [&](std::size_t k) { return crossing.place[k] >= panel.low[k] && crossing.place[k] <= panel.high[k]; };
+      if (!within(0) || !within(1)) continue;
+      rays.push_back(start_ray(setting_.chart, panel, crossing.place, std::span(r_.arena.node).subspan(crossing.near.begin, crossing.near.size())));
+      pairs.emplace_back(&panel, &crossing);
     }
   }
   if (rays.empty()) return false;
-  lift(setting_.view, rays, setting_.enough, r_.arena.rays);
-  if (!starts_settled_) settle_starts();
-  for (const SigmaRay& ray : rays) {
-    if (!ray.found || !(ray.pressure > 0.0)) continue;
-    r_.start.push_back(ray.local(ray.height));
-    r_.start_pressure.push_back(ray.pressure);
-  }
+  r_.order.resize(rays.size());
+  std::iota(r_.order.begin(), r_.order.end(), 0U);
+  probe(setting_.view, rays, r_.order, r_.arena.rays);
   bool any = false;
-  for (const std::uint32_t i : holder) {
-    look_for_starts(r_.panel[i]);
-    any = any || r_.panel[i].missed_load > 0.0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    const SigmaRay& ray = rays[k];
+    if (!std::isfinite(ray.step) || !(ray.pressure > 0.0)) continue;
+    const auto& [panel, crossing] = pairs[k];
+    const double fall = (crossing->upper ? -1.0 : 1.0) * ray.slope[crossing->across], most = panel->high[crossing->across] - panel->low[crossing->across];
+    const double area = 0.5 * crossing->width * (fall > 0.0 ? std::min(ray.pressure / fall, most) : most);
+    panel->missed_area += area;
+    panel->missed_load += area * ray.pressure / 3.0;
+    part_longer(setting_.chart, *panel);
+    any = true;
   }
   return any;
 }
 
 /// A panel without points that holds a place where the bodies press misses something, unless a third body may have it.
 void PanelSolver::look_for_starts(Panel& panel) {
-  for (std::uint32_t l = panel.levels.begin; l < panel.levels.end; ++l) {
-    if (setting_.levels.is_third(r_.arena.level[l])) return;
-  }
+  if (has_third(panel)) return;
   double most = most_of_starts(panel);
   if (!(most > 0.0)) return;
   if (!starts_settled_) {

@@ -78,6 +78,9 @@ struct PanelArena {
   /// A place on a side of a panel where the patch goes on beyond it, as the panel's lines have it, and rays near it.
   struct Crossing {
     std::array<double, 2> place;
+    double width;            // of the patch along the side that the place stands for [m]
+    std::uint8_t across;     // the coordinate that leads beyond the side
+    bool upper;              // by rising
     Slice near;
   };
   std::vector<Crossing> crossing;
