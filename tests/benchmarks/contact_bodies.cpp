@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "contact_shapes.h"
+#include "many_parts.h"
 #include "programs.h"
 #include "supple/collision/react.h"
 #include "supple/implicit/solids.h"
@@ -19,40 +20,7 @@ namespace {
 using namespace supple;
 using namespace supple::benchmarks;
 
-constexpr double kModulus = 5e3, kObstacleModulus = 1e6;
-
-/// Wyvill primitives, one part each.
-struct Parts {
-  implicit::Skeleton skeleton;
-  std::vector<Pose> pose;
-  std::vector<Vec3> still;
-  implicit::SampleLayout layout;
-  implicit::PlacedSkeleton placed;
-  implicit::Field field;
-  implicit::SampleState kept;
-  implicit::SurfaceSamples samples;
-
-  Parts(implicit::Skeleton from, double spacing) : skeleton(std::move(from)), layout(implicit::make_sample_layout(skeleton, spacing)) {
-    pose.resize(skeleton.part_count);
-    still.assign(pose.size(), Vec3::Zero());
-  }
-  void index() {
-    implicit::place_skeleton(skeleton, pose, placed);
-    implicit::index_field(skeleton, placed, field);
-    implicit::sample_surface({skeleton, layout, pose, field}, {}, Executor(1), kept, samples);
-  }
-  [[nodiscard]] collision::ContactBody body() const {
-    collision::ContactBody b;
-    b.field = field;
-    b.material.modulus = kModulus;
-    b.pose = pose;
-    b.velocity = still;
-    b.angular_velocity = still;
-    b.samples = &samples;
-    b.skeleton = &skeleton;
-    return b;
-  }
-};
+constexpr double kObstacleModulus = 1e6;
 
 /// A jelly of columns x columns x layers points, a little out of their places, with the middle of the lowest layer in the origin.
 Parts jelly(int columns, int layers) {
@@ -71,28 +39,6 @@ Parts jelly(int columns, int layers) {
       for (int i = 0; i < columns; ++i) parts.pose[at++].position = kSpacing * Vec3(i - 0.5 * (columns - 1), j - 0.5 * (columns - 1), k);
     }
   }
-  return parts;
-}
-
-/// A body such as fits make: ellipsoids of many sizes, each near an earlier one.
-Parts limbs(std::uint32_t count) {
-  constexpr double kLeast = 0.04, kMost = 0.2, kLongest = 3.0, kApart = 0.3;  // supports [m], long over thin, and between middles over the size
-  Draw draw(count);
-  implicit::Skeleton skeleton;
-  skeleton.part_count = count;
-  std::vector<Pose> pose;
-  for (std::uint32_t k = 0; k < count; ++k) {
-    implicit::Primitive& p = skeleton.primitive.emplace_back();
-    p.part = k;
-    p.shape = implicit::ShapeKind::Ellipsoid;
-    const double size = draw.logarithmic(kLeast, kMost);
-    p.size = size * Vec3(1.0, draw.uniform(1.0, kLongest), draw.uniform(1.0, kLongest));
-    p.kernel = implicit::Kernel::wyvill(1.0);
-    const Vec3 beside = k == 0 ? Vec3::Zero().eval() : Vec3(pose[static_cast<std::size_t>(draw.uniform(0.0, k))].position + kApart * p.size.maxCoeff() * draw.direction());
-    pose.push_back({beside, draw.rotation()});
-  }
-  Parts parts(std::move(skeleton), 0.012);
-  parts.pose = std::move(pose);
   return parts;
 }
 
@@ -252,24 +198,13 @@ int supple::benchmarks::programs::contact_bodies(int argc, char** argv) {
     });
   }
   for (const std::string_view under : {"box", "plane", "edge"}) {
-    constexpr double kDeepest = 0.03;
     const std::string name = "limbs_32_on_" + std::string(under);
     if (!wanted(name)) continue;
     Parts parts = limbs(32);
     const std::vector<Pose> rest = parts.pose;
     const implicit::SolidBox box = support(under);
     measure(name, poses, rule, seed, reference, [&](Draw& draw) {
-      const Quat turn = draw.rotation();
-      const auto place = [&](const Vec3& aside) {
-        for (std::size_t k = 0; k < rest.size(); ++k) parts.pose[k] = {turn * rest[k].position + aside, turn * rest[k].orientation};
-        parts.index();
-      };
-      place(Vec3::Zero());
-      Vec3 lowest = Vec3::Zero();
-      for (std::size_t i = 0; i < parts.samples.point.size(); ++i) {
-        if (parts.samples.valid[i] != 0 && parts.samples.point[i].z() < lowest.z()) lowest = parts.samples.point[i];
-      }
-      place(Vec3(draw.uniform(-0.02, 0.02), draw.uniform(-0.02, 0.02), -draw.logarithmic(0.05, 1.0) * kDeepest) - lowest);
+      lay(parts, rest, draw);
       return std::array<collision::ContactBody, 2>{parts.body(), under == "plane" ? obstacle(plane) : obstacle(box)};
     });
   }

@@ -7,6 +7,7 @@
 
 #include "../../collision/src/surface/panels/level_roots.h"
 #include "../../collision/src/surface/panels/panel_corners.h"
+#include "benchmarks/many_parts.h"
 #include "collision/bodies.h"
 #include "supple/implicit/solids.h"
 
@@ -348,6 +349,55 @@ TEST(Panels, OfABodyPressedDeeplyIntoAHardBlockAgreeWithMarching) {
     EXPECT_LE(s.largest_overlap, 0.15);  // the body's height
     EXPECT_GE(s.largest_overlap, 0.05);
   }
+}
+
+/// Ellipsoids of many sizes on the edge of a box: slivers of the patch lie in panels whose nodes do not press, beside panels whose lines lead into them, or
+/// between two nodes.
+TEST(Panels, OfUnequalEllipsoidsOnAnEdgeKeepTheirEstimates) {
+  constexpr std::uint64_t kSeed = 5;
+  benchmarks::Parts body = benchmarks::limbs(32);
+  const std::vector<Pose> rest = body.pose;
+  const implicit::SolidBox box(Pose{Vec3(-0.4, 0.0, -0.2), Quat::Identity()}, Vec3(0.4, 0.4, 0.2), 0.01, 1.0);
+  benchmarks::Draw draw(kSeed);
+  for (int pose = 0; pose < 3; ++pose) {
+    benchmarks::lay(body, rest, draw);
+    Stage stage;
+    stage.add(body.field) = body.body();
+    stage.add(box, {Vec3::Zero()}, 1e6).fixed = true;
+    const ContactSurface::Summary exact = stage.solve({.error = 1e-5, .energy = false, .only = ContactRule::March}).summary.at(0);
+    ASSERT_LE(exact.error_estimate, 2e-5);
+    const PlaneSums sums{exact.force.norm(), exact.area, exact.centre_of_pressure};
+    for (const double asked : {1e-2, 1e-3}) {
+      const ContactSurface::Summary s = stage.solve({.error = asked, .energy = false}).summary.at(0);
+      EXPECT_LE(s.error_estimate, asked);
+      EXPECT_LE(error_of(s, sums), s.error_estimate + exact.error_estimate) << pose << ' ' << asked;
+    }
+  }
+}
+
+/// A limb that dips into hard ground and runs on beneath its surface: most of the limb's samples lie where no Sigma is above them.
+TEST(Panels, OfALimbBeneathTheGroundAreFew) {
+  implicit::Skeleton skeleton;
+  skeleton.part_count = 24;
+  for (std::uint32_t k = 0; k < skeleton.part_count; ++k) {
+    implicit::Primitive& p = skeleton.primitive.emplace_back();
+    p.part = k;
+    p.kernel = implicit::Kernel::wyvill(0.08);
+  }
+  benchmarks::Parts body(std::move(skeleton), 0.012);
+  for (std::size_t k = 0; k < body.pose.size(); ++k) body.pose[k].position = Vec3(0.02 * static_cast<double>(k), 0.0, 0.06 - 0.008 * static_cast<double>(k));
+  body.index();
+  const implicit::HalfSpace ground{Vec3::Zero(), Vec3::UnitZ(), 20.0};
+  Stage stage;
+  stage.add(body.field) = body.body();
+  stage.add(ground, {Vec3::Zero()}, 1e6).fixed = true;
+  const ContactSurface::Summary exact = stage.solve({.error = 1e-5, .energy = false, .only = ContactRule::March}).summary.at(0);
+  const PlaneSums sums{exact.force.norm(), exact.area, exact.centre_of_pressure};
+  const ContactSurface::Summary s = stage.solve({.error = 1e-2, .energy = false}).summary.at(0);
+  EXPECT_EQ(s.rule, ContactRule::Panels);
+  EXPECT_LE(s.error_estimate, 1e-2);
+  EXPECT_LE(error_of(s, sums), s.error_estimate + exact.error_estimate);
+  EXPECT_LE(s.evaluations, 20000u);
 }
 
 TEST(Panels, AreTheSameWhicheverBodyIsNamedFirst) {
