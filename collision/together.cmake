@@ -16,5 +16,5 @@ supple_together(
   "src/surface/polar/imprint.cpp src/surface/polar/star_rule.cpp src/surface/quadrature.cpp"
   "src/surface/polar/polar_patches.cpp src/surface/polar/polar_rule.cpp src/surface/region/polar_columns.cpp
    src/surface/region/squeezed_region.cpp"
-  "src/surface/polar/rim_corners.cpp src/surface/region/energy_columns.cpp
+  "src/surface/polar/rim_corners.cpp src/surface/region/column_kinks.cpp src/surface/region/energy_columns.cpp
    src/surface/region/sigma_columns.cpp src/surface/third_bodies.cpp")

@@ -146,6 +146,22 @@ TEST(Marching, TakesFewerPointsAtCoarserErrors) {
   EXPECT_LT(static_cast<double>(points[0]), 0.5 * static_cast<double>(points[1]));
 }
 
+// Columns out of the bodies go through where second derivatives of their pressures jump: above the rim of a disc, at the ends of a rod.
+TEST(EnergiesOfSeveral, HoldWhereColumnsCrossKinks) {
+  constexpr double kError = 1e-4;
+  TimedQuery query;
+  for (const std::uint64_t seed : {9965u, 330158u, 330254u}) {
+    const BodiesInOnePlace place(3, seed);
+    const std::vector<ContactBody> bodies = place.bodies();
+    const LostVolumes exact = lost_volumes(bodies, kColumns), half = lost_volumes(bodies, kColumns / 2);
+    for (const double error : {1e-3, kError}) {
+      const double off = std::abs(ContactsOfBodies(bodies.size(), query.ask(bodies, error)).energy - exact.energy);
+      EXPECT_LE(off, sum_of(query.estimate_energies(bodies, error)) + energy_left(exact, half)) << seed << ' ' << error;
+    }
+    EXPECT_NEAR(ContactsOfBodies(bodies.size(), query.ask(bodies, kError)).energy, exact.energy, kError * exact.energy + energy_left(exact, half)) << seed;
+  }
+}
+
 TEST(EnergyEstimates, AreNoneWithoutContact) {
   TimedQuery query;
   BodiesInOnePlace place(2, 400);

@@ -40,7 +40,7 @@ double MarchRuleSolver::area_of(const Piece& piece) const {
 /// Tangents of the image at a foot, as if it were on Sigma.
 void MarchRuleSolver::find_tangents(Feet& feet, std::size_t i) const {
   const auto& c = mesh_.triangle[feet.triangle[i]].corner;
-  const Vec3 n = along(feet.triangle[i], feet.at[i]), slope = feet.batch.slope_a[i] - feet.batch.slope_b[i];
+  const Vec3 &n = feet.way[i], slope = feet.batch.slope_a[i] - feet.batch.slope_b[i];
   const double rate = slope.dot(n);
   const auto flat = [&](std::uint32_t to) {
     return Vec3(mesh_.vertex[to] - mesh_.vertex[c[0]] + feet.height[i] * (mesh_.normal[to] - mesh_.normal[c[0]]));
@@ -52,17 +52,19 @@ void MarchRuleSolver::find_tangents(Feet& feet, std::size_t i) const {
 }
 
 /// Whether the image lies the same way round there as its triangle, and does not stand on end.
-bool MarchRuleSolver::upright(const Feet& feet, std::size_t i) const {
-  const Vec3 normal = feet.batch.slope_b[i] - feet.batch.slope_a[i], way = along(feet.triangle[i], feet.at[i]);
+bool MarchRuleSolver::upright(const Feet& feet, std::size_t i) {
+  const Vec3 normal = feet.batch.slope_b[i] - feet.batch.slope_a[i], &way = feet.way[i];
   return normal.dot(way) > kGraphCosine * normal.norm() * way.norm() && feet.along_s[i].cross(feet.along_t[i]).dot(normal) > 0.0;
 }
 
-/// Pressures at some feet, at their heights so far, and the tangents of the image there.
+/// Pressures at some feet, at their heights so far.
 void MarchRuleSolver::measure(PairPressure& pressure, Thirds third, Feet& feet, std::span<const std::size_t> which) {
   heed_scope();  // a pair may take seconds
-  for (const std::size_t i : which) feet.batch.point[i] = plane(feet.triangle[i], feet.at[i]) + feet.height[i] * along(feet.triangle[i], feet.at[i]);
+  for (const std::size_t i : which) {
+    feet.way[i] = along(feet.triangle[i], feet.at[i]);
+    feet.batch.point[i] = plane(feet.triangle[i], feet.at[i]) + feet.height[i] * feet.way[i];
+  }
   pressure.evaluate(feet.batch, which, some_);
-  for (const std::size_t i : which) find_tangents(feet, i);
   if (third.empty()) return;
   place_.resize(which.size());
   value_.resize(which.size());
@@ -87,6 +89,7 @@ void MarchRuleSolver::Feet::make_room() {
   batch.resize(n);
   along_s.resize(n);
   along_t.resize(n);
+  way.resize(n);
   climb.resize(n);
   third.assign(n, 0.0);
   third_slope.assign(n, Vec3::Zero());
@@ -95,20 +98,20 @@ void MarchRuleSolver::Feet::make_room() {
 }
 
 /// How far a foot is from Sigma along the interpolated normal, to first order.
-double MarchRuleSolver::to_sigma(const Feet& feet, std::size_t i) const {
-  return (feet.batch.b[i] - feet.batch.a[i]) / (feet.batch.slope_a[i] - feet.batch.slope_b[i]).dot(along(feet.triangle[i], feet.at[i]));
+double MarchRuleSolver::to_sigma(const Feet& feet, std::size_t i) {
+  return (feet.batch.b[i] - feet.batch.a[i]) / (feet.batch.slope_a[i] - feet.batch.slope_b[i]).dot(feet.way[i]);
 }
 
 /// The pressures after such a move, to first order.
-void MarchRuleSolver::lift(Feet& feet, std::size_t i, double move) const {
-  const Vec3 way = move * along(feet.triangle[i], feet.at[i]);
+void MarchRuleSolver::lift(Feet& feet, std::size_t i, double move) {
+  const Vec3 way = move * feet.way[i];
   feet.batch.point[i] += way;
   feet.batch.a[i] += feet.batch.slope_a[i].dot(way);
   feet.batch.b[i] += feet.batch.slope_b[i].dot(way);
   feet.third[i] += feet.third_slope[i].dot(way);
 }
 
-/// Feet on Sigma by Newton's method in their heights.
+/// Feet on Sigma by Newton's method in their heights, with the tangents of the image before the last step.
 void MarchRuleSolver::place(PairPressure& pressure, Thirds third, Feet& feet) {
   feet.make_room();
   open_.resize(feet.size());
@@ -117,11 +120,13 @@ void MarchRuleSolver::place(PairPressure& pressure, Thirds third, Feet& feet) {
     measure(pressure, third, feet, open_);
     std::size_t left = 0;
     for (const std::size_t i : open_) {
-      const double move = to_sigma(feet, i);
+      const double move = to_sigma(feet, i), there = feet.height[i] + std::clamp(move, -0.5 * cell_, 0.5 * cell_);
+      const bool lost = !(std::abs(there) <= cell_), last = step + 1 == kBracketSteps, near = std::abs(move) <= on_sigma_ * cell_;
+      if (lost || last || near) find_tangents(feet, i);
       if (!std::isfinite(move)) continue;
-      feet.height[i] += std::clamp(move, -0.5 * cell_, 0.5 * cell_);
-      if (std::abs(feet.height[i]) > cell_) continue;
-      if (std::abs(move) > on_sigma_ * cell_) {
+      feet.height[i] = there;
+      if (lost) continue;
+      if (!near) {
         open_[left++] = i;
         continue;
       }

@@ -192,6 +192,7 @@ void MarchRuleSolver::find_corners(PairPressure& pressure, Thirds third, std::si
         open_[left++] = i;
         continue;
       }
+      find_tangents(feet_, i);
       lift(feet_, i, move);
       const Foot here = foot(feet_, i);
       Vec3 slope;

@@ -120,32 +120,32 @@ void MarchRuleSolver::begin(PairPressure& pressure, Thirds third, std::vector<Pi
     const auto [low, high] = std::minmax(triangle.corner[(across + 1) % 3], triangle.corner[(across + 2) % 3]);
     return static_cast<std::uint64_t>(low) << 32 | high;
   };
-  edges_.clear();
-  for (const SigmaMesh::Triangle& triangle : mesh_.triangle) {
-    for (std::size_t k = 0; k < 3; ++k) edges_.push_back(edge_of(triangle, k));
-  }
-  std::sort(edges_.begin(), edges_.end());
-  edges_.erase(std::unique(edges_.begin(), edges_.end()), edges_.end());
   const std::size_t vertices = mesh_.vertex.size();
   const auto place_of = [&](std::uint32_t t, std::size_t k) {
     const SigmaMesh::Triangle& triangle = mesh_.triangle[t];
     if (k < 3) return static_cast<std::size_t>(triangle.corner[k]);
-    return vertices + static_cast<std::size_t>(std::lower_bound(edges_.begin(), edges_.end(), edge_of(triangle, k - 3)) - edges_.begin());
+    return vertices + edges_.number(edge_of(triangle, k - 3));
   };
+  edges_.start(3 * mesh_.triangle.size());
   feet_.clear();
-  feet_.triangle.assign(vertices + edges_.size(), kNone);
-  feet_.at.resize(feet_.triangle.size());
-  feet_.height.assign(feet_.triangle.size(), 0.0);
+  feet_.triangle.assign(vertices, kNone);
+  feet_.at.resize(vertices);
   spots_.clear();
   for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
     for (std::size_t k = 0; k < 6; ++k) {
       const std::size_t i = place_of(t, k);
       spots_.push_back(i);
-      if (feet_.triangle[i] != kNone) continue;
-      feet_.triangle[i] = t;
-      feet_.at[i] = at[k];
+      if (i < feet_.triangle.size()) {
+        if (feet_.triangle[i] != kNone) continue;
+        feet_.triangle[i] = t;
+        feet_.at[i] = at[k];
+      } else {
+        feet_.triangle.push_back(t);
+        feet_.at.push_back(at[k]);
+      }
     }
   }
+  feet_.height.assign(feet_.triangle.size(), 0.0);
   place(pressure, third, feet_);
   pieces.assign(mesh_.triangle.size(), {});
   for (std::uint32_t t = 0; t < pieces.size(); ++t) {

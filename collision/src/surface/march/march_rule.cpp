@@ -11,6 +11,7 @@
 #include "surface/accuracy.h"
 #include "surface/march/flat_cells.h"
 #include "surface/quadrature.h"
+#include "surface/region/column_kinks.h"
 #include "surface/region/squeezed_region.h"
 
 namespace supple::collision {
@@ -18,6 +19,7 @@ namespace {
 
 /// Of a cell: a last step as long as this leaves its square, and normals as good as it.
 constexpr double kOnSigma = 1e-9, kOnSigmaAtBest = 1e-12;
+constexpr double kEndOfColumn = 0.03;  // of a cell and the root of the error: a last step, which leaves its square
 constexpr int kMostHalvings = 4;       // of the cells of a mesh at which something presses
 constexpr int kRoughHalvings = 1;      // the same, where an error of kRough or more is asked for
 constexpr double kRough = 5e-2;
@@ -59,6 +61,7 @@ void MarchRuleSolver::find_zeros(PairPressure& pressure, Thirds third, std::vect
       if (std::abs(feet_.height[i]) > cell_) continue;
       open_[left++] = i;
       if (std::abs(move) > kFarOff * cell_) continue;
+      find_tangents(feet_, i);
       lift(feet_, i, move);
       const Foot here = foot(feet_, i);
       const bool rim = ray.kink == kPressure;
@@ -196,7 +199,7 @@ MarchRuleSolver::Node MarchRuleSolver::node_at(std::size_t i) const {
   Node node;
   node.point = feet_.batch.point[i];
   node.normal = across.normalized();
-  node.along = along(feet_.triangle[i], feet_.at[i]);
+  node.along = feet_.way[i];
   node.weight = share_[i] * s.cross(t).dot(node.normal);
   node.residual = std::abs(feet_.batch.a[i] - feet_.batch.b[i]);
   node.swept = {share_[i] * s.cross(t).dot(node.along), share_[i] * (s.cross(turn_t) + turn_s.cross(t)).dot(node.along),
@@ -369,6 +372,7 @@ bool MarchRuleSolver::hold(PairPressure& pressure, int side) {
 void MarchRuleSolver::add_columns(PairPressure& pressure, int side, double error, const Node& peak, PatchPoints& points) {
   start_columns(pressure, side, peak);
   const std::size_t n = nodes_.size();
+  const double enough = kEndOfColumn * std::sqrt(error) * cell_;
   open_.resize(n);
   std::iota(open_.begin(), open_.end(), std::size_t{0});
   for (int step = 0; step < kBracketSteps && !open_.empty(); ++step) {
@@ -387,7 +391,7 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, double error
       const double fall = -slope_[k].dot(c.way), longest = apex_ ? std::max(cell_, c.at) : cell_;
       double next = fall > 0.0 ? c.at + std::clamp(value_[k] / fall, -longest, longest) : c.at + longest;
       if (!(next >= c.low && next <= c.high)) next = std::isfinite(c.high) ? 0.5 * (c.low + c.high) : c.low + longest;
-      const bool moves = std::abs(next - c.at) > 1e-9 * cell_;
+      const bool moves = std::abs(next - c.at) > enough;
       c.at = next;
       if (moves) open_[left++] = i;
     }
@@ -395,14 +399,20 @@ void MarchRuleSolver::add_columns(PairPressure& pressure, int side, double error
   }
   points.unsure[side] = points.unsure[side] || !hold(pressure, side);
   if (points.unsure[side]) return;
-  const GaussRule& gauss = gauss_rule(std::max(order_for(error) - 1, kFewNodes) + (apex_ ? kMoreAcross : 0));
+  const int order = std::max(order_for(error) - 1, kFewNodes) + (apex_ ? kMoreAcross : 0);
+  ColumnKinks kinks(pressure, side, error);
   const std::size_t begin = points.volume_point.size();
   for (std::size_t i = 0; i < n; ++i) {
     const Column& c = columns_[i];
-    for (std::size_t j = 0; j < gauss.node.size(); ++j) {
-      const double t = c.at * gauss.node[j];
-      points.volume_point.push_back(nodes_[i].point + t * c.way);
-      points.volume_weight.push_back(c.swept.width(t) * c.at * gauss.weight[j]);
+    const std::span<const double> part = kinks.parts(nodes_[i].point, c.way, c.at);
+    const GaussRule& gauss = gauss_rule(order_of_parts(order, part));
+    for (std::size_t k = 0; k + 1 < part.size(); ++k) {
+      const double length = part[k + 1] - part[k];
+      for (std::size_t j = 0; j < gauss.node.size(); ++j) {
+        const double t = part[k] + length * gauss.node[j];
+        points.volume_point.push_back(nodes_[i].point + t * c.way);
+        points.volume_weight.push_back(c.swept.width(t) * length * gauss.weight[j]);
+      }
     }
   }
   if (apex_ && apex_->lost) fill_body(pressure, side, apex_->at, error, points.volume_point, points.volume_weight);

@@ -105,6 +105,7 @@ class MarchRuleSolver {
     std::vector<double> third;
     std::vector<Vec3> third_slope;
     std::vector<Vec3> along_s, along_t;  // of the image [m]
+    std::vector<Vec3> way;               // the interpolated normal, which is no unit vector
     std::vector<Vec2> climb;
     std::vector<std::uint8_t> met, good;  // Sigma was, and the image is smooth there
     void clear();
@@ -155,11 +156,11 @@ class MarchRuleSolver {
   };
 
   void find_tangents(Feet& feet, std::size_t i) const;
-  [[nodiscard]] bool upright(const Feet& feet, std::size_t i) const;
+  [[nodiscard]] static bool upright(const Feet& feet, std::size_t i);
   void measure(PairPressure& pressure, Thirds third, Feet& feet, std::span<const std::size_t> which);
   void place(PairPressure& pressure, Thirds third, Feet& feet);
-  [[nodiscard]] double to_sigma(const Feet& feet, std::size_t i) const;
-  void lift(Feet& feet, std::size_t i, double move) const;
+  [[nodiscard]] static double to_sigma(const Feet& feet, std::size_t i);
+  static void lift(Feet& feet, std::size_t i, double move);
   [[nodiscard]] Vec3 plane(std::uint32_t triangle, const Vec2& at) const;
   [[nodiscard]] Vec3 along(std::uint32_t triangle, const Vec2& at) const;
   [[nodiscard]] double area_of(const Piece& piece) const;
@@ -228,7 +229,7 @@ class MarchRuleSolver {
   std::vector<double> value_, third_, share_;
   std::vector<Vec3> slope_, place_;
   std::vector<std::size_t> open_;
-  std::vector<std::uint64_t> edges_;  // of the mesh: both vertices
+  FirstCome edges_;  // of the mesh: both vertices
   std::vector<std::uint8_t> rough_;   // triangles of long cells, or of too many, that are not smooth: between their corners Sigma may turn
   std::vector<std::size_t> spots_;    // of its triangles: six feet each
   std::vector<Piece> pieces_, halves_, doubtful_;

@@ -134,24 +134,29 @@ void SigmaMesher::cut_cells(SigmaMesh& out) {
   // Six tetrahedra around the main diagonal of a cell: one for each order of the axes.
   constexpr std::array<std::array<std::size_t, 2>, 6> kPaths{{{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}}};
   cuts_.clear();  // three a triangle
-  std::array<std::uint32_t, 8> next{};  // nodes at the corners of the last cell: those of later ones come later
+  std::array<std::uint32_t, 4> next{};  // nodes at the corners of the last cell with the lower x, which the others follow: those of later cells come later
   for (const Key key : cells_) {
-    const Place at = place_of(key);
     std::array<std::uint32_t, 8> node;
     std::array<bool, 8> above;
-    for (std::size_t c = 0; c < 8; ++c) {
-      const auto k = corner(c);
-      const Key wanted = key_of({at[0] + k[0], at[1] + k[1], at[2] + k[2]});
+    for (std::size_t c = 0; c < 4; ++c) {
+      const Key wanted = key + (c & 1) * kAlongAxis[1] + (c >> 1) * kAlongAxis[2];
       while (nodes_[next[c]] != wanted) ++next[c];
+      node[2 * c] = next[c];
+      node[2 * c + 1] = next[c] + 1;
     }
-    for (std::size_t c = 0; c < 8; ++c) {
-      auto k = corner(c);
-      for (std::size_t i = 0; i < 2; ++i) {
-        if (mirrored_ && at[i] < 0) k[i] = 1 - k[i];
+    Place at{};
+    if (mirrored_) {
+      at = place_of(key);
+      const std::array<std::uint32_t, 8> plain = node;
+      for (std::size_t c = 0; c < 8; ++c) {
+        auto k = corner(c);
+        for (std::size_t i = 0; i < 2; ++i) {
+          if (at[i] < 0) k[i] = 1 - k[i];
+        }
+        node[c] = plain[static_cast<std::size_t>(k[0] + 2 * k[1] + 4 * k[2])];
       }
-      node[c] = next[static_cast<std::size_t>(k[0] + 2 * k[1] + 4 * k[2])];
-      above[c] = node_.a[node[c]] >= node_.b[node[c]];
     }
+    for (std::size_t c = 0; c < 8; ++c) above[c] = node_.a[node[c]] >= node_.b[node[c]];
     if (std::equal(above.begin() + 1, above.end(), above.begin())) continue;
     const bool reversed = mirrored_ && (at[0] < 0) != (at[1] < 0);
     for (const auto& path : kPaths) {
@@ -179,14 +184,13 @@ void SigmaMesher::cut_cells(SigmaMesh& out) {
       }
     }
   }
-  unique_ = cuts_;
-  std::sort(unique_.begin(), unique_.end());
-  unique_.erase(std::unique(unique_.begin(), unique_.end()), unique_.end());
   out.triangle.clear();
-  const auto index = [this](const Cut& c) {
-    return static_cast<std::uint32_t>(std::lower_bound(unique_.begin(), unique_.end(), c) - unique_.begin());
-  };
-  for (std::size_t i = 0; i < cuts_.size(); i += 3) out.triangle.push_back({{index(cuts_[i]), index(cuts_[i + 1]), index(cuts_[i + 2])}});
+  numbered_.start(cuts_.size());
+  for (std::size_t i = 0; i < cuts_.size(); i += 3) {
+    out.triangle.push_back({{numbered_.number(cuts_[i].key()), numbered_.number(cuts_[i + 1].key()), numbered_.number(cuts_[i + 2].key())}});
+  }
+  unique_.clear();
+  for (const std::uint64_t key : numbered_.keys()) unique_.push_back(Cut::of(key));
 }
 
 /// Newton's method on the edges of the lattice, held between places on both sides of Sigma: triangles do not turn over, as they may where

@@ -9,6 +9,7 @@
 
 #include "surface/find_peak.h"
 #include "surface/march/flat_cells.h"
+#include "surface/march/first_come.h"
 #include "surface/pair_pressure.h"
 
 namespace supple::collision {
@@ -48,7 +49,8 @@ class SigmaMesher {
 
   struct Cut {
     std::uint32_t above, below;  // nodes: p_A >= p_B, p_A < p_B
-    friend auto operator<=>(const Cut&, const Cut&) = default;
+    [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(above) << 32 | below; }
+    static Cut of(std::uint64_t key) { return {static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)}; }
   };
   /// Where Sigma cuts the way from `above` to `below`, between places on both sides of it.
   struct Edge {
@@ -61,6 +63,7 @@ class SigmaMesher {
   std::vector<Key> cells_, near_, nodes_;
   PressureBatch node_, vertex_, some_;
   std::vector<Cut> cuts_, unique_;
+  FirstCome numbered_;
   std::vector<Edge> edge_;
   std::vector<std::size_t> open_;
   std::vector<std::uint8_t> met_;  // vertices that Newton's method placed

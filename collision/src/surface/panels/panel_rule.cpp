@@ -803,7 +803,7 @@ bool PanelSolver::solve(PatchPoints& points, PanelOutcome& out) {
   if (!taken && (!(all_.load > 0.0) || (job_.graph_only && !has_one_sheet()))) return false;
   hand_over(points, out);
   if (star) return true;
-  add_columns({job_.pressure, setting_.view.frame.axis[2], setting_.order - (job_.energy ? 1 : 2), setting_.enough, setting_.view.reach, job_.regions}, r_.panel, r_.arena.point, points);
+  add_columns({job_.pressure, setting_.view.frame.axis[2], setting_.order - (job_.energy ? 1 : 2), setting_.enough, setting_.view.reach, job_.regions, job_.error}, r_.panel, r_.arena.point, points);
   return true;
 }
 

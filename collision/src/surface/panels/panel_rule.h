@@ -84,6 +84,7 @@ struct ColumnJob {
   double enough;       ///< of a step to a column's end [m]
   double reach;        ///< longest step that is believed [m]
   Regions regions;
+  double error;        ///< at which mild kinks of the bodies count
 };
 
 /// The integral of p_A over V_A, of a body that every line along the way leaves once, is the flux through Sigma of way times the integral of p_A from

@@ -10,6 +10,7 @@
 #include "supple/core/math.h"
 #include "surface/accuracy.h"
 #include "surface/quadrature.h"
+#include "surface/region/column_kinks.h"
 
 namespace supple::collision {
 namespace {
@@ -192,11 +193,12 @@ void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error,
   const std::size_t begin = point.size();
   std::vector<Vec3> way;
   std::vector<double> share, end, value;
+  ColumnKinks kinks(pressure, side, error);
   double before = 0.0;
   for (int n = kFewest; n <= kMost; n *= 2) {
     // Gauss in the height, in panels, equal angles around it: exact of spherical harmonics of a low degree.
     const int panels = std::max(1, n / kInPanel);
-    const GaussRule &height = gauss_rule(n / panels), &along = gauss_rule(kAlong);
+    const GaussRule& height = gauss_rule(n / panels);
     way.clear();
     share.clear();
     for (int panel = 0; panel < panels; ++panel) {
@@ -213,10 +215,15 @@ void fill_body(PairPressure& pressure, int side, const Vec3& apex, double error,
     point.resize(begin);
     volume.resize(begin);
     for (std::size_t i = 0; i < way.size(); ++i) {
-      for (std::size_t j = 0; j < along.node.size(); ++j) {
-        const double s = end[i] * along.node[j];
-        point.push_back(apex + s * way[i]);
-        volume.push_back(share[i] * end[i] * along.weight[j] * s * s);
+      const std::span<const double> part = kinks.parts(apex, way[i], end[i]);
+      const GaussRule& along = gauss_rule(order_of_parts(kAlong, part));
+      for (std::size_t k = 0; k + 1 < part.size(); ++k) {
+        const double length = part[k + 1] - part[k];
+        for (std::size_t j = 0; j < along.node.size(); ++j) {
+          const double s = part[k] + length * along.node[j];
+          point.push_back(apex + s * way[i]);
+          volume.push_back(share[i] * length * along.weight[j] * s * s);
+        }
       }
     }
     const auto added = std::span(point).subspan(begin);

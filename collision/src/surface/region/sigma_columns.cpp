@@ -4,6 +4,7 @@
 #include "surface/accuracy.h"
 #include "surface/panels/panel_rule.h"
 #include "surface/quadrature.h"
+#include "surface/region/column_kinks.h"
 #include "surface/region/squeezed_region.h"
 
 namespace supple::collision {
@@ -79,13 +80,18 @@ bool find_ends(PairPressure& pressure, int side, const Search& search, std::vect
   return lead_out && open.empty();
 }
 
-/// Points along the columns, and the volumes that they stand for.
-void fill_columns(const GaussRule& rule, std::span<const Column> columns, PatchPoints& points) {
+/// Points along the columns, and the volumes that they stand for. @param order  of Gauss's rule along a column
+void fill_columns(int order, ColumnKinks& kinks, std::span<const Column> columns, PatchPoints& points) {
   for (const Column& column : columns) {
-    for (std::size_t k = 0; k < rule.node.size(); ++k) {
-      const double along = rule.node[k] * column.length, wide = 1.0 + along * column.widens;
-      points.volume_point.push_back(column.from + along * column.way);
-      points.volume_weight.push_back(rule.weight[k] * column.length * column.share * wide * wide);
+    const std::span<const double> part = kinks.parts(column.from, column.way, column.length);
+    const GaussRule& rule = gauss_rule(order_of_parts(order, part));
+    for (std::size_t i = 0; i + 1 < part.size(); ++i) {
+      const double length = part[i + 1] - part[i];
+      for (std::size_t k = 0; k < rule.node.size(); ++k) {
+        const double along = part[i] + rule.node[k] * length, wide = 1.0 + along * column.widens;
+        points.volume_point.push_back(column.from + along * column.way);
+        points.volume_weight.push_back(rule.weight[k] * length * column.share * wide * wide);
+      }
     }
   }
 }
@@ -102,7 +108,8 @@ void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<
     points.unsure[side] = points.unsure[side] || !sure;
     if (!sure) continue;
     const std::size_t begin = points.volume_point.size();
-    fill_columns(gauss_rule(job.order), columns, points);
+    ColumnKinks kinks(job.pressure, static_cast<int>(side), job.error);
+    fill_columns(job.order, kinks, columns, points);
     add_to_region(job.pressure, static_cast<int>(side), begin, value, points);
     if (job.regions[side] == Region::Points) continue;
     points.volume_point.resize(begin);
@@ -123,8 +130,9 @@ void add_flow(PairPressure& pressure, int side, const Apex& apex, double error, 
   }
   find_ends(pressure, side, {kStep * std::sqrt(error) * reach, reach, 0.0}, columns);
   const std::size_t begin = points.volume_point.size();
-  // Columns may go through most of the body; two more digits ask for one more point.
-  fill_columns(gauss_rule(std::clamp(static_cast<int>(std::lround(5.0 - 0.5 * std::log10(error))), 6, 10)), columns, points);
+  // Columns may go through most of the body: five points hold the pressure of a ball, and two more digits ask for one more.
+  ColumnKinks kinks(pressure, side, error);
+  fill_columns(std::clamp(static_cast<int>(std::lround(3.5 - 0.5 * std::log10(error))), 5, 9), kinks, columns, points);
   if (apex.lost) fill_body(pressure, side, apex.at, error, points.volume_point, points.volume_weight);
   add_to_region(pressure, side, begin, value, points);
   points.volume_point.resize(begin);
