@@ -213,8 +213,8 @@ void compare(const std::filesystem::path& file, double error) {
   const Shape shape(data);
   Description skeleton;
   for (const FittedPrimitive& p : object.primitives) {
-    const bool round = p.semi_axes.x() == p.semi_axes.y() && p.semi_axes.x() == p.semi_axes.z();
-    skeleton.blobs.push_back({.centre = scale * (object.particles[p.particle] + p.at), .axes = scale * p.semi_axes, .turn = p.orientation, .round = round});
+    const bool round = !p.segment && p.semi_axes.x() == p.semi_axes.y() && p.semi_axes.x() == p.semi_axes.z();
+    skeleton.blobs.push_back({.centre = scale * (object.particles[p.particle] + p.at), .axes = scale * p.semi_axes, .turn = p.orientation, .form = p.segment ? Form::Segment : round ? Form::Ball : Form::Ellipsoid});
   }
   const std::string name = file.stem().string();
   print_row(shape, name, error, "fit", skeleton, fitted - start);

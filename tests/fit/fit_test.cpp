@@ -70,6 +70,34 @@ TEST(Fit, CoarserErrorsTakeFewerPrimitives) {
   }
 }
 
+TEST(Fit, CoarserErrorsNeverTakeMorePrimitives) {
+  // A ring of six beads whose hole is small: it closes before any distance is large.
+  Mesh mesh = test::torus(1.0, 0.5, 120, 48);
+  for (Vec3& p : mesh.position) {
+    const double angle = std::atan2(p.y(), p.x());
+    const Vec3 middle(std::cos(angle), std::sin(angle), 0.0);
+    p = middle + (1.0 + 0.4 * std::cos(6.0 * angle)) * (p - middle);
+  }
+  const auto file = test::saved(mesh, "beads");
+  std::size_t finer = 10000;
+  for (const double error : {0.02, 0.05}) {
+    const FitReport r = fit(file, {.error = error, .particles = 12}).report;
+    EXPECT_TRUE(r.within) << error;
+    EXPECT_EQ(r.genus_out, 1) << error;
+    EXPECT_LE(r.primitives, finer) << error;
+    finer = r.primitives;
+  }
+}
+
+TEST(Fit, RodsTakeSegments) {
+  // No ellipsoid is a rod: without segments it takes five.
+  const FittedObject object = fit(test::saved(test::rod(1.0, 0.1), "rod"), {.error = 0.02, .particles = 1});
+  expect_good(object, 0.02, 0);
+  EXPECT_LE(object.primitives.size(), 2U);
+  for (const FittedPrimitive& p : object.primitives) EXPECT_TRUE(p.segment);
+  EXPECT_NE(object_text(object, "rod").find("{shape: segment, half_length: "), std::string::npos);
+}
+
 TEST(Fit, DoesNotDependOnThreads) {
   const auto file = test::saved(test::torus(1.0, 0.4, 48, 24), "threads");
   const FittedObject one = fit(file, {.error = 0.03, .particles = 20, .threads = 1}), three = fit(file, {.error = 0.03, .particles = 20, .threads = 3});

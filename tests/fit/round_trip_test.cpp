@@ -66,6 +66,21 @@ TEST_F(FittedScene, HasTheFittedSurfaceAtItsPlaceAndScale) {
   }
 }
 
+TEST(FittedRod, HasTheFittedSurfaceInAScene) {
+  Mesh mesh = test::rod(0.3, 0.05);
+  const Quat turn(Eigen::AngleAxisd(0.7, Vec3(1.0, 2.0, -1.0).normalized()));
+  for (Vec3& p : mesh.position) p = turn * p;
+  const FittedObject rod = fit(test::saved(mesh, "rod_data"), {.error = 0.02, .particles = 1});
+  std::ofstream(temp_folder() / "rod.yaml") << object_text(rod, "a rod");
+  const scenes::Model model = scenes::build_model(scenes::parse_scene("schema: 1\nduration: 1\nobjects:\n  - {name: it, include: rod.yaml, particles: {at: [0, 0, 0]}}\n", "rods.yaml", temp_folder()));
+  const implicit::Field field = field_of(model, 0);
+  for (const Vec3& p : rod.surface.position) {
+    Vec3 gradient;
+    const double value = implicit::FieldView(field).value(p, gradient);
+    EXPECT_LT(std::abs(value), 1e-4 * gradient.norm() * rod.report.diagonal);
+  }
+}
+
 TEST_F(FittedScene, TakesMassAndBondsFromItsMaterial) {
   const scenes::Model model = scenes::build_model(scene());
   const auto mass_of = [&](const scenes::ObjectModel& o) {

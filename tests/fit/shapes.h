@@ -2,6 +2,8 @@
 /// Closed meshes of known shapes, written where `fit` reads them.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <numbers>
@@ -34,6 +36,37 @@ inline Mesh torus(double large, double small, std::uint32_t around, std::uint32_
       mesh.triangle.push_back({p, q, r0});
       mesh.triangle.push_back({p, r0, s});
     }
+  }
+  return mesh;
+}
+
+/// A rod with round ends along x.
+inline Mesh rod(double half, double radius) {
+  constexpr std::uint32_t kRings = 48, kAround = 32;
+  Mesh mesh;
+  for (std::uint32_t i = 0; i < kRings; ++i) {
+    // Ten rings on each end, the others between; the first and the last are nearly points.
+    constexpr double kOfEnd = 10.0;
+    const double k = i, end = std::min({k, kRings - 1.0 - k, kOfEnd}) / kOfEnd;
+    const double angle = 0.5 * std::numbers::pi * (1.0 - end) * (1.0 - 1e-3), along = std::clamp((k - kOfEnd) / (kRings - 1.0 - 2.0 * kOfEnd), 0.0, 1.0);
+    const double x = half * (2.0 * along - 1.0) + (2.0 * i < kRings ? -1.0 : 1.0) * radius * std::sin(angle);
+    for (std::uint32_t j = 0; j < kAround; ++j) {
+      const double turn = 2.0 * std::numbers::pi * j / kAround;
+      mesh.position.emplace_back(x, radius * std::cos(angle) * std::cos(turn), radius * std::cos(angle) * std::sin(turn));
+      const std::uint32_t next = (j + 1) % kAround, p = i * kAround;
+      if (i + 1 < kRings) {
+        mesh.triangle.push_back({p + j, p + next, p + kAround + next});
+        mesh.triangle.push_back({p + j, p + kAround + next, p + kAround + j});
+      }
+    }
+  }
+  const auto first = static_cast<std::uint32_t>(mesh.position.size());
+  mesh.position.emplace_back(-half - radius, 0.0, 0.0);
+  mesh.position.emplace_back(half + radius, 0.0, 0.0);
+  for (std::uint32_t j = 0; j < kAround; ++j) {
+    const std::uint32_t next = (j + 1) % kAround, last = (kRings - 1) * kAround;
+    mesh.triangle.push_back({first, next, j});
+    mesh.triangle.push_back({first + 1, last + j, last + next});
   }
   return mesh;
 }

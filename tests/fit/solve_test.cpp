@@ -11,9 +11,9 @@ namespace {
 
 std::vector<Blob> known() {
   std::vector<Blob> blobs(3);
-  blobs[0] = {.centre = Vec3(-0.15, 0.0, 0.02), .axes = Vec3(0.5, 0.35, 0.3), .turn = Quat(Eigen::AngleAxisd(0.4, Vec3(1, 2, 3).normalized())), .round = false};
+  blobs[0] = {.centre = Vec3(-0.15, 0.0, 0.02), .axes = Vec3(0.5, 0.35, 0.3), .turn = Quat(Eigen::AngleAxisd(0.4, Vec3(1, 2, 3).normalized())), .form = Form::Ellipsoid};
   blobs[1] = {.centre = Vec3(0.2, 0.05, 0.0), .axes = Vec3(0.3, 0.3, 0.3)};
-  blobs[2] = {.centre = Vec3(0.05, 0.2, -0.05), .axes = Vec3(0.25, 0.4, 0.3), .turn = Quat(Eigen::AngleAxisd(-0.7, Vec3(0, 1, 1).normalized())), .round = false};
+  blobs[2] = {.centre = Vec3(0.05, 0.2, -0.05), .axes = Vec3(0.25, 0.4, 0.3), .turn = Quat(Eigen::AngleAxisd(-0.7, Vec3(0, 1, 1).normalized())), .form = Form::Ellipsoid};
   return blobs;
 }
 
@@ -41,7 +41,7 @@ std::vector<Blob> disturbed() {
   for (std::size_t k = 0; k < blobs.size(); ++k) {
     blobs[k].centre += 0.02 * Vec3(1.0, -1.0, k == 1 ? 1.0 : -0.5);
     blobs[k].axes *= k == 1 ? 1.15 : 0.9;
-    if (!blobs[k].round) blobs[k].turn = (blobs[k].turn * Quat(Eigen::AngleAxisd(0.15, Vec3::UnitX()))).normalized();
+    if (blobs[k].form != Form::Ball) blobs[k].turn = (blobs[k].turn * Quat(Eigen::AngleAxisd(0.15, Vec3::UnitX()))).normalized();
   }
   return blobs;
 }
@@ -56,6 +56,54 @@ TEST(Solve, FindsKnownEllipsoidsAgain) {
   for (std::size_t k = 0; k < blobs.size(); ++k) {
     EXPECT_LT((blobs[k].centre - expected[k].centre).norm(), 1e-4);
     EXPECT_LT((blobs[k].axes - expected[k].axes).norm(), 1e-3);
+  }
+}
+
+const Blob kRod{.centre = Vec3(0.1, -0.05, 0.02), .axes = Vec3(0.4, 0.3, 0.3), .turn = Quat(Eigen::AngleAxisd(0.8, Vec3(1, -1, 2).normalized())), .form = Form::Segment};
+
+TEST(Solve, FindsAKnownSegmentAgain) {
+  SolveOptions options = kOptions;
+  options.largest = 2.0;  // of balls whose surface is as long
+  const Targets targets = targets_of({kRod});
+  Blob start = kRod;
+  start.centre += Vec3(0.02, -0.03, 0.01);
+  start.axes = Vec3(0.3, 0.35, 0.35);
+  start.turn = (start.turn * Quat(Eigen::AngleAxisd(0.15, Vec3::UnitZ()))).normalized();
+  std::vector<Blob> blobs{start};
+  EXPECT_LT(solve(blobs, targets, options, Executor(2)), 1e-6);
+  EXPECT_LT((blobs[0].centre - kRod.centre).norm(), 1e-4);
+  EXPECT_LT((blobs[0].axes - kRod.axes).norm(), 1e-3);
+  EXPECT_GT(std::abs((blobs[0].turn * Vec3::UnitX()).dot(kRod.turn * Vec3::UnitX())), 1.0 - 1e-6);
+}
+
+TEST(Solve, LeavesFixedBlobsAsTheyAre) {
+  const Targets targets = targets_of(known());
+  const std::vector<Blob> start = disturbed();
+  std::vector<Blob> blobs = start;
+  SolveOptions options = kOptions;
+  options.fixed = {0, 1, 0};
+  balance(blobs, targets, options, Executor(2));
+  solve(blobs, targets, options, Executor(2));
+  EXPECT_EQ(blobs[1].centre, start[1].centre);
+  EXPECT_EQ(blobs[1].axes, start[1].axes);
+  EXPECT_NE(blobs[0].centre, start[0].centre);
+  EXPECT_NE(blobs[2].centre, start[2].centre);
+}
+
+TEST(Blob, SlopesAreThoseOfDifferences) {
+  constexpr double kStep = 1e-6;
+  const SolveOptions free{.smallest = 1e-3, .largest = 10.0};
+  for (const Blob& blob : {known()[0], kRod}) {
+    for (const Vec3& own : {Vec3(0.05, 0.1, 0.08), Vec3(-0.45, 0.06, 0.03), Vec3(0.2, -0.12, 0.05)}) {  // beside a segment and beyond its end
+      const Vec3 x = blob.centre + blob.turn * own;
+      const BlobValue at = value_of(blob, x);
+      ASSERT_GT(at.value, 0.0);
+      for (Eigen::Index k = 0; k < kBlobParameters; ++k) {
+        const BlobStep step = kStep * BlobStep::Unit(k);
+        const double slope = (value_of(moved(blob, step, free), x).value - value_of(moved(blob, -step, free), x).value) / (2.0 * kStep);
+        EXPECT_NEAR(at.slope[k], slope, 1e-7) << k;  // round-off of f over the step, and its third derivative times the square of the step
+      }
+    }
   }
 }
 

@@ -28,14 +28,23 @@ std::string point_text(const Vec3& p) {
 }
 
 void put_primitive(std::string& out, const FittedPrimitive& p) {
-  const bool round = p.semi_axes.x() == p.semi_axes.y() && p.semi_axes.x() == p.semi_axes.z();
+  const bool round = !p.segment && p.semi_axes.x() == p.semi_axes.y() && p.semi_axes.x() == p.semi_axes.z();
   if (round) {
     put(out, "  - {shape: point, at: %s, kernel: {radius: %.7g}, particles: [%u]}\n", point_text(p.at).c_str(), p.semi_axes.x(), p.particle);
     return;
   }
   const Eigen::AngleAxisd turn(Eigen::Quaterniond(p.orientation.coeffs()));
-  put(out, "  - {shape: ellipsoid, semi_axes: %s, at: %s, turn_axis: %s, turn_deg: %.7g, kernel: {type: wyvill}, particles: [%u]}\n", point_text(p.semi_axes).c_str(), point_text(p.at).c_str(),
-      point_text(turn.axis()).c_str(), turn.angle() * 180.0 / std::numbers::pi, p.particle);
+  if (p.segment) {
+    put(out, "  - {shape: segment, half_length: %.7g, ", p.semi_axes.x());
+  } else {
+    put(out, "  - {shape: ellipsoid, semi_axes: %s, ", point_text(p.semi_axes).c_str());
+  }
+  put(out, "at: %s, turn_axis: %s, turn_deg: %.7g, kernel: ", point_text(p.at).c_str(), point_text(turn.axis()).c_str(), turn.angle() * 180.0 / std::numbers::pi);
+  if (p.segment) {
+    put(out, "{radius: %.7g}, particles: [%u]}\n", p.semi_axes.y(), p.particle);
+  } else {
+    put(out, "{type: wyvill}, particles: [%u]}\n", p.particle);
+  }
 }
 
 }  // namespace

@@ -18,41 +18,77 @@ constexpr std::size_t kBlock = 128;
 constexpr double kSlope = 0.78;    // of Wyvill's point at iso 0.5, times the radius of its surface
 constexpr double kNormal = 0.3;    // an angle counts as this share of the spacing of samples
 constexpr double kMargin = 0.1;    // of the field at points inside and outside
-constexpr Eigen::Index kMost = 9;  // parameters of an ellipsoid: centre, logarithms of the axes, rotation
+constexpr Eigen::Index kMost = kBlobParameters;
 using Row = Eigen::Matrix<double, 1, kMost>;
 using Rows = Eigen::Matrix<double, 3, kMost, Eigen::RowMajor>;
 using VecX = Eigen::VectorXd;
 
-Eigen::Index parameters(const Blob& blob) { return blob.round ? 4 : kMost; }
+Eigen::Index parameters(const Blob& blob) { return blob.form == Form::Ball ? 4 : kMost; }
+
+/// The squared distance u from a shape over that where its support ends, in its own axes.
+struct Relative {
+  double u = 0.0;
+  Vec3 gradient = Vec3::Zero();
+  Mat3 second = Mat3::Zero();
+  Vec3 by_size = Vec3::Zero();            ///< du by the logarithms of the axes
+  Mat3 gradient_by_size = Mat3::Zero();   ///< columns
+};
+
+Relative of_ellipsoid(const Vec3& axes, const Vec3& y) {
+  Relative out;
+  const Vec3 inverse = axes.cwiseInverse(), z = y.cwiseProduct(inverse), w = z.cwiseProduct(inverse);
+  out.u = z.squaredNorm();
+  out.gradient = 2.0 * w;
+  out.second = (2.0 * inverse.cwiseProduct(inverse)).asDiagonal();
+  out.by_size = -2.0 * z.cwiseProduct(z);
+  out.gradient_by_size = (-4.0 * w).asDiagonal();
+  return out;
+}
+
+Relative of_segment(const Vec3& axes, const Vec3& y) {
+  Relative out;
+  const double half = axes.x(), foot = std::clamp(y.x(), -half, half), scale = 1.0 / (axes.y() * axes.y());
+  const bool beside = foot == y.x();
+  const Vec3 away(y.x() - foot, y.y(), y.z());
+  out.u = scale * away.squaredNorm();
+  out.gradient = 2.0 * scale * away;
+  out.second = (2.0 * scale * Vec3(beside ? 0.0 : 1.0, 1.0, 1.0)).asDiagonal();
+  out.by_size = Vec3(beside ? 0.0 : -out.gradient.x() * foot, -2.0 * out.u, 0.0);  // the foot moves with the end
+  if (!beside) out.gradient_by_size(0, 0) = -2.0 * scale * foot;
+  out.gradient_by_size.col(1) = -2.0 * out.gradient;
+  return out;
+}
 
 /// Value of a blob at a point and its derivatives by the parameters; those of the gradient along two directions.
 struct BlobRows {
+  double value = 0.0;
   Rows rows = Rows::Zero();  ///< of the value, and of both slopes
 };
 
 BlobRows rows_of(const Blob& blob, const Vec3& x, const std::array<Vec3, 2>* tangents) {
   BlobRows out;
   const Mat3 q = blob.turn.toRotationMatrix();
-  const Vec3 y = q.transpose() * (x - blob.centre), inverse = blob.axes.cwiseInverse(), z = y.cwiseProduct(inverse);
-  const Vec3 w = z.cwiseProduct(inverse), squares = z.cwiseProduct(z), metric = inverse.cwiseProduct(inverse);
-  const double rest = 1.0 - squares.sum();
+  const Vec3 y = q.transpose() * (x - blob.centre);
+  const Relative at = blob.form == Form::Segment ? of_segment(blob.axes, y) : of_ellipsoid(blob.axes, y);
+  const double rest = 1.0 - at.u;
   if (!(rest > 0.0)) return out;
+  out.value = rest * rest * rest;
   const double first = -3.0 * rest * rest, second = 6.0 * rest;  // of (1 - u)^3 by u
-  const auto put = [&](Eigen::Index row, const Vec3& centre, const Vec3& size, const Vec3& turn) {
-    out.rows.row(row).segment<3>(0) = (q * centre).transpose();
-    if (blob.round) {
+  const auto put = [&](Eigen::Index row, const Vec3& place, const Vec3& size, const Vec3& turn) {
+    out.rows.row(row).segment<3>(0) = -(q * place).transpose();
+    if (blob.form == Form::Ball) {
       out.rows(row, 3) = size.sum();
     } else {
       out.rows.row(row).segment<3>(3) = size.transpose();
-      out.rows.row(row).segment<3>(6) = turn.transpose();
+      out.rows.row(row).segment<3>(6) = -turn.transpose();
     }
   };
-  put(0, -2.0 * first * w, -2.0 * first * squares, -2.0 * first * y.cross(w));
+  const Vec3 turned = y.cross(at.gradient);
+  put(0, first * at.gradient, first * at.by_size, first * turned);
   for (Eigen::Index k = 0; tangents != nullptr && k < 2; ++k) {
-    const Vec3 t = q.transpose() * (*tangents)[static_cast<std::size_t>(k)], scaled = t.cwiseProduct(metric);
-    const double along = t.dot(w);
-    put(1 + k, -4.0 * second * along * w - 2.0 * first * scaled, -4.0 * second * along * squares - 4.0 * first * t.cwiseProduct(w),
-        -4.0 * second * along * y.cross(w) - 2.0 * first * (t.cross(w) + y.cross(scaled)));
+    const Vec3 t = q.transpose() * (*tangents)[static_cast<std::size_t>(k)], bent = at.second * t;
+    const double along = second * t.dot(at.gradient);
+    put(1 + k, along * at.gradient + first * bent, along * at.by_size + first * (at.gradient_by_size.transpose() * t), along * turned + first * (t.cross(at.gradient) + y.cross(bent)));
   }
   return out;
 }
@@ -60,7 +96,7 @@ BlobRows rows_of(const Blob& blob, const Vec3& x, const std::array<Vec3, 2>* tan
 /// The linearised problem: J by samples, each with the blobs that reach it.
 class Problem {
  public:
-  Problem(std::span<const Blob> blobs, const Targets& targets, const Executor& executor) : targets_(targets), executor_(executor) {
+  Problem(std::span<const Blob> blobs, const Targets& targets, const SolveOptions& options, const Executor& executor) : targets_(targets), executor_(executor) {
     for (const Vec3& n : targets.surface.normal) {
       const Vec3 t = n.unitOrthogonal();
       tangent_.push_back({t, n.cross(t)});
@@ -72,7 +108,10 @@ class Problem {
       scale_.insert(scale_.end(), signs->weight.begin(), signs->weight.end());
     }
     first_parameter_.resize(blobs.size() + 1, 0);
-    for (std::size_t k = 0; k < blobs.size(); ++k) first_parameter_[k + 1] = first_parameter_[k] + parameters(blobs[k]);
+    for (std::size_t k = 0; k < blobs.size(); ++k) {
+      const bool fixed = !options.fixed.empty() && options.fixed[k] != 0;
+      first_parameter_[k + 1] = first_parameter_[k] + (fixed ? 0 : parameters(blobs[k]));
+    }
   }
 
   [[nodiscard]] Eigen::Index parameter_count() const { return first_parameter_.back(); }
@@ -121,7 +160,9 @@ class Problem {
       for (std::size_t i = 0; i + 1 < block.offset.size(); ++i) {
         const std::size_t s = first_entry_.size() - 1;
         const bool idle = s >= targets_.surface.position.size() && residual[3 * static_cast<Eigen::Index>(s)] == 0.0;
-        if (!idle) blob_.insert(blob_.end(), block.part.begin() + block.offset[i], block.part.begin() + block.offset[i + 1]);
+        for (std::uint32_t e = block.offset[i]; !idle && e < block.offset[i + 1]; ++e) {
+          if (range(block.part[e]).second > 0) blob_.push_back(block.part[e]);
+        }
         first_entry_.push_back(static_cast<std::uint32_t>(blob_.size()));
       }
     }
@@ -261,29 +302,63 @@ VecX damped_step(const Problem& problem, const VecX& residual, double damping) {
   return x;
 }
 
-std::vector<Blob> moved(std::span<const Blob> blobs, const Problem& problem, const VecX& step, const SolveOptions& options) {
+/// Sizes of a blob within the options; none is much longer than thin but a segment.
+void limit_sizes(Blob& blob, const SolveOptions& options) {
+  constexpr double kMostRatio = 4.0, kShortest = 0.05;  // of segments, over the radius
+  if (blob.form == Form::Segment) {
+    const double radius = std::clamp(blob.axes.y(), options.smallest, options.largest), shortest = kShortest * radius;
+    blob.axes = Vec3(std::clamp(blob.axes.x(), shortest, std::max(shortest, kPointRadius * (options.largest - radius))), radius, radius);
+    return;
+  }
+  blob.axes = blob.axes.cwiseMax(options.smallest).cwiseMin(options.largest);
+  blob.axes = blob.axes.cwiseMax(blob.axes.maxCoeff() / kMostRatio);
+}
+
+std::vector<Blob> moved_all(std::span<const Blob> blobs, const Problem& problem, const VecX& step, const SolveOptions& options) {
   std::vector<Blob> out(blobs.begin(), blobs.end());
-  constexpr double kFarthest = 0.3, kMostGrowth = 0.3, kMostTurn = 0.5, kMostRatio = 4.0;
   for (std::uint32_t b = 0; b < out.size(); ++b) {
-    Blob& blob = out[b];
     const auto [at, n] = problem.range(b);
-    Vec3 shift = step.segment<3>(at);
-    const double farthest = kFarthest * blob.axes.minCoeff();
-    if (shift.norm() > farthest) shift *= farthest / shift.norm();
-    blob.centre += shift;
-    const Vec3 growth = (blob.round ? Vec3(Vec3::Constant(step[at + 3])) : Vec3(step.segment<3>(at + 3))).cwiseMax(-kMostGrowth).cwiseMin(kMostGrowth);
-    blob.axes = blob.axes.cwiseProduct(growth.unaryExpr([](double g) { return math::exp(g); })).cwiseMax(options.smallest).cwiseMin(options.largest);
-    if (blob.round) continue;
-    blob.axes = blob.axes.cwiseMax(blob.axes.maxCoeff() / kMostRatio);
-    Vec3 turn = step.segment<3>(at + 6);
-    if (turn.norm() > kMostTurn) turn *= kMostTurn / turn.norm();
-    const Vec3 half = 0.5 * turn;
-    blob.turn = (blob.turn * Quat(1.0, half.x(), half.y(), half.z())).normalized();
+    BlobStep own = BlobStep::Zero();
+    own.head(n) = step.segment(at, n);
+    if (n > 0) out[b] = moved(out[b], own, options);
   }
   return out;
 }
 
+/// Derivative of f by the logarithm of the thickness, from its gradient.
+double slope_of_size(const Blob& blob, const Vec3& x, const Vec3& gradient) {
+  Vec3 from = x - blob.centre;
+  if (blob.form == Form::Segment) {
+    const Vec3 along = blob.turn * Vec3::UnitX();
+    from -= std::clamp(from.dot(along), -blob.axes.x(), blob.axes.x()) * along;
+  }
+  return -gradient.dot(from);
+}
+
 }  // namespace
+
+BlobValue value_of(const Blob& blob, const Vec3& x) {
+  const BlobRows at = rows_of(blob, x, nullptr);
+  return {at.value, at.rows.row(0).transpose()};
+}
+
+Blob moved(const Blob& blob, const BlobStep& step, const SolveOptions& options) {
+  constexpr double kFarthest = 0.3, kMostGrowth = 0.3, kMostTurn = 0.5;
+  Blob out = blob;
+  Vec3 shift = step.segment<3>(0);
+  const double farthest = kFarthest * (blob.form == Form::Segment ? blob.axes.y() : blob.axes.minCoeff());
+  if (shift.norm() > farthest) shift *= farthest / shift.norm();
+  out.centre += shift;
+  const Vec3 growth = (blob.form == Form::Ball ? Vec3(Vec3::Constant(step[3])) : Vec3(step.segment<3>(3))).cwiseMax(-kMostGrowth).cwiseMin(kMostGrowth);
+  out.axes = blob.axes.cwiseProduct(growth.unaryExpr([](double g) { return math::exp(g); }));
+  limit_sizes(out, options);
+  if (blob.form == Form::Ball) return out;
+  Vec3 turn = step.segment<3>(6);
+  if (turn.norm() > kMostTurn) turn *= kMostTurn / turn.norm();
+  const Vec3 half = 0.5 * turn;
+  out.turn = (blob.turn * Quat(1.0, half.x(), half.y(), half.z())).normalized();
+  return out;
+}
 
 implicit::Skeleton skeleton_of(std::span<const Blob> blobs) {
   implicit::Skeleton out;
@@ -294,8 +369,11 @@ implicit::Skeleton skeleton_of(std::span<const Blob> blobs) {
     implicit::Primitive primitive;
     primitive.part = k;
     primitive.offset = {blob.centre, blob.turn};
-    primitive.kernel = implicit::Kernel::wyvill(blob.axes.minCoeff());
-    if (!blob.round) {
+    primitive.kernel = implicit::Kernel::wyvill(blob.form == Form::Segment ? blob.axes.y() : blob.axes.minCoeff());
+    if (blob.form == Form::Segment) {
+      primitive.shape = implicit::ShapeKind::Segment;
+      primitive.size = Vec3(blob.axes.x(), 0.0, 0.0);
+    } else if (blob.form == Form::Ellipsoid) {
       primitive.shape = implicit::ShapeKind::Ellipsoid;
       primitive.size = blob.axes;
     }
@@ -331,7 +409,7 @@ void balance(std::vector<Blob>& blobs, const Targets& targets, const SolveOption
       own.clear();
       for (std::size_t e = first; e < last; ++e) {
         value += block.value[e];
-        own.push_back(-block.gradient[e].dot(points[s] - blobs[block.part[e]].centre));  // by the logarithm of the size
+        own.push_back(slope_of_size(blobs[block.part[e]], points[s], block.gradient[e]));
         all += own.back();
       }
       for (std::size_t e = first; e < last; ++e) {
@@ -341,15 +419,20 @@ void balance(std::vector<Blob>& blobs, const Targets& targets, const SolveOption
     }
     for (std::size_t b = 0; b < blobs.size(); ++b) {
       constexpr double kMostChange = 0.2;
-      if (!(slope[b] > 0.0)) continue;
+      if (!(slope[b] > 0.0) || (!options.fixed.empty() && options.fixed[b] != 0)) continue;
       const double change = std::clamp(-error[b] / slope[b], -kMostChange, kMostChange);
-      blobs[b].axes = ((1.0 + change) * blobs[b].axes).cwiseMax(options.smallest).cwiseMin(options.largest);
+      if (blobs[b].form == Form::Segment) {
+        blobs[b].axes.tail<2>() *= 1.0 + change;
+      } else {
+        blobs[b].axes *= 1.0 + change;
+      }
+      limit_sizes(blobs[b], options);
     }
   }
 }
 
 double solve(std::vector<Blob>& blobs, const Targets& targets, const SolveOptions& options, const Executor& executor) {
-  Problem problem(blobs, targets, executor);
+  Problem problem(blobs, targets, options, executor);
   constexpr double kFirstDamping = 0.01, kLeastDamping = 1e-5, kMostDamping = 1e4;
   double damping = kFirstDamping;
   VecX residual;
@@ -359,7 +442,7 @@ double solve(std::vector<Blob>& blobs, const Targets& targets, const SolveOption
     const double cost = residual.squaredNorm();
     problem.linearise(blobs, residual);
     for (; damping < kMostDamping; damping *= 10.0) {
-      std::vector<Blob> tried = moved(blobs, problem, damped_step(problem, residual, damping), options);
+      std::vector<Blob> tried = moved_all(blobs, problem, damped_step(problem, residual, damping), options);
       if (!(problem.residuals(tried, false).squaredNorm() < cost)) continue;
       blobs = std::move(tried);
       damping = std::max(kLeastDamping, 0.2 * damping);

@@ -10,12 +10,20 @@
 
 namespace supple::fit {
 
-/// Wyvill's kernel on an ellipsoid: f = (1 - |D^-1 Q^T (x - c)|^2)^3.
+inline constexpr double kPointRadius = 0.45420201867;  ///< of a lone point's surface at iso 0.5, over that of its support
+
+enum class Form : std::uint8_t {
+  Ball,
+  Ellipsoid,
+  Segment,  ///< a rod with round ends
+};
+
+/// A primitive f = (1 - u)^3 with Wyvill's kernel, y = Q^T (x - c): of an ellipsoid u = |D^-1 y|^2, of a segment the square of the distance to it over the radius.
 struct Blob {
   Vec3 centre = Vec3::Zero();
-  Vec3 axes = Vec3::Zero();         ///< semi-axes of the support D, all equal where `round`
+  Vec3 axes = Vec3::Zero();         ///< semi-axes of the support D, all equal for a ball; of a segment half its length along x, then twice the radius of the support
   Quat turn = Quat::Identity();     ///< Q
-  bool round = true;
+  Form form = Form::Ball;
 };
 
 /// The field of blobs, each a part of its own, with the kernels of scenes.
@@ -43,8 +51,21 @@ struct Targets {
 struct SolveOptions {
   int iterations = 10;
   double smallest = 0.0;   ///< of semi-axes of the support
-  double largest = 0.0;
+  double largest = 0.0;    ///< of these; the surface of a segment is no longer than that of such a ball
+  std::vector<char> fixed{};  ///< which blobs stay as they are; empty: none
 };
+
+inline constexpr int kBlobParameters = 9;  ///< centre, logarithms of the axes, rotation about own axes; balls have the first four
+using BlobStep = Eigen::Matrix<double, kBlobParameters, 1>;
+
+/// f at a point and its derivatives by the parameters.
+struct BlobValue {
+  double value = 0.0;
+  BlobStep slope = BlobStep::Zero();
+};
+[[nodiscard]] BlobValue value_of(const Blob& blob, const Vec3& x);
+/// Moved by a step of its parameters, at most by a share of its size, and of sizes within the options.
+[[nodiscard]] Blob moved(const Blob& blob, const BlobStep& step, const SolveOptions& options);
 
 /// Scales every blob so that the field is that of the data on average over what it reaches: a start for `solve` where overlapping blobs add up to too much. By
 /// simultaneous corrections (SIRT, Gilbert 1972), each the share of a blob in the error of the field over the slopes of all by their sizes.

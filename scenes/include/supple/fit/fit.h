@@ -94,12 +94,13 @@ struct FitReport {
   [[nodiscard]] double two_sided() const { return from_data.largest > to_data.largest ? from_data.largest : to_data.largest; }
 };
 
-/// An ellipsoid of support with Wyvill's kernel (implicit/skeleton.h).
+/// An ellipsoid or a segment with Wyvill's kernel (implicit/skeleton.h).
 struct FittedPrimitive {
   std::uint32_t particle = 0;            ///< that carries it
   Vec3 at = Vec3::Zero();                ///< from the particle, in its frame [m]; frames of solids have the axes of the data
-  Vec3 semi_axes = Vec3::Zero();         ///< of the support [m]; three equal ones: a point
+  Vec3 semi_axes = Vec3::Zero();         ///< of the support [m]; three equal ones: a point. Of a segment: half its length along x, then twice the radius of the support
   Quat orientation = Quat::Identity();   ///< of the axes
+  bool segment = false;
 };
 
 /// A particle of a shell.
