@@ -152,8 +152,8 @@ void report_errors(FittedObject& object, const Data& data, const FoundSkeleton& 
       std::snprintf(text.data(), text.size(), "the largest distance is %.3g %% of the diagonal, more than the %.3g %% asked with at most %u primitives", largest, asked, options.primitives);
     } else {
       std::snprintf(text.data(), text.size(),
-                    "the largest distance is %.3g %% of the diagonal, more than the %.3g %% asked; more primitives do not help: %.2g %% of the surface lies at walls or gaps thinner than "
-                    "%.2g %%, which primitives of this error do not describe",
+                    "the largest distance is %.3g %% of the diagonal, more than the %.3g %% asked, although more primitives were allowed; %.2g %% of the surface lies at walls or gaps "
+                    "thinner than %.2g %%, the thinnest primitive that this error allows",
                     largest, asked, 100.0 * share_thinner_than(data, skeleton.thinnest), 200.0 * skeleton.thinnest);
     }
     report.warnings.emplace_back(text.data());
