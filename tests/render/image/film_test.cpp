@@ -209,7 +209,7 @@ TEST(Film, EndsWithAllThatItStartedWhenItIsInterrupted) {
     interrupt = SIGINT;
   });
   EXPECT_THROW(encode_film({folder.path(), "ball", 1, 2, 24.0}, folder / "film.mp4", &interrupt), Interrupted);
-  EXPECT_FALSE(runs(number_in(folder / "outer")));
+  EXPECT_TRUE(soon([&] { return !runs(number_in(folder / "outer")); }));
   const pid_t inner = number_in(folder / "inner");
   EXPECT_NE(inner, 0);
   EXPECT_TRUE(soon([&] { return !runs(inner); }));
