@@ -15,7 +15,6 @@ class ColumnKinks {
   /// The kinks of one body, as far as its field tells; none of bodies without end. @param error  at which mild ones are left out
   ColumnKinks(const PairPressure& pressure, int side, double error);
 
-  [[nodiscard]] bool none() const { return kink_.empty(); }
   /// The ends of the parts of a column in which the pressure is smooth: 0, where it crosses kinks, and its length [m], rising.
   /// @param way  unit   @return valid until the next call
   [[nodiscard]] std::span<const double> parts(const Vec3& from, const Vec3& way, double length);
