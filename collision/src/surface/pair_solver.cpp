@@ -10,6 +10,7 @@
 #include "pairs/boxes.h"
 #include "pairs/cores.h"
 #include "surface/polar/symmetry.h"
+#include "surface/region/sigma_columns.h"
 
 namespace supple::collision {
 namespace {
@@ -367,7 +368,7 @@ bool PairSolver::stars_cut(const Job& job, double asked, PairResult& out) {
     }
     PanelOutcome outcome;
     const Vec3& origin = cover.frame.origin;
-    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, job.polar.regions, origin, job.settings().energy, false, &cover, imprints_, free_, apex_}, panel_room_, out.points, outcome)) return false;
+    if (!solve_by_panels({pressure, third_levels_, job.overlap, {}, error, origin, false, &cover, imprints_, free_, apex_}, panel_room_, out.points, outcome)) return false;
     const PatchSums& sums = outcome.sums;
     out.add(sums, origin);
     share_.push_back({sums.force, sums.first + sums.load * origin, sums.load, sums.area, outcome.estimate});
@@ -442,8 +443,8 @@ bool PairSolver::panels(const Job& job, PairResult& out) {
   PanelRule rule;
   return solve_in_order(job, rule, ContactRule::Panels, [&](const Regions& regions, const Vec3& reference) {
     take_third_levels(job);
-    const bool fits = solve_by_panels({pressure, third_levels_, job.overlap, starts, job.settings().error, regions, reference, job.settings().energy, job.settings().only == ContactRule::None}, panel_room_, out.points, rule.outcome);
-    for (const std::size_t side : {0u, 1u}) out.points.unsure[side] = out.points.unsure[side] || rule.outcome.thirds;
+    const bool fits = solve_by_panels({pressure, third_levels_, job.overlap, starts, job.settings().error, reference, job.settings().only == ContactRule::None}, panel_room_, out.points, rule.outcome);
+    for (const std::size_t side : {0u, 1u}) out.points.unsure[side] = regions[side] != Region::None;
     return fits;
   }, out);
 }
@@ -543,6 +544,7 @@ void PairSolver::fill_unsure_regions(const Job& job, PairResult& out) {
   for (const int side : {0, 1}) {
     if (!points.unsure[side]) continue;
     points.drop_region(side);
+    if (!poor && add_columns({job.polar.pressure, side, third_bodies_, job.polar.regions[static_cast<std::size_t>(side)], asked}, points)) continue;
     region_.fill({job.polar.pressure, side, third_bodies_, error}, job.overlap, points.normal[peak], points);
   }
 }

@@ -700,7 +700,6 @@ void PanelSolver::hand_over(PatchPoints& points, PanelOutcome& out) {
   const double most = job_.overlap.extent().dot(setting_.view.frame.axis[2].cwiseAbs());
   const auto thickness = [&](const PanelPoint& p, std::size_t side) { return p.fall[side] > 0.0 ? std::min(p.pressure / p.fall[side], most) : most; };
   for (const Panel& panel : r_.panel) {
-    out.thirds = out.thirds || panel.thirds != 0;
     for (std::uint32_t i = panel.points.begin; i < panel.points.end; ++i) {
       const PanelPoint& p = r_.arena.point[i];
       points.point.push_back(p.at);
@@ -802,8 +801,6 @@ bool PanelSolver::solve(PatchPoints& points, PanelOutcome& out) {
   const bool taken = star && out.estimate == 0.0 && !(all_.load > 0.0);
   if (!taken && (!(all_.load > 0.0) || (job_.graph_only && !has_one_sheet()))) return false;
   hand_over(points, out);
-  if (star) return true;
-  add_columns({job_.pressure, setting_.view.frame.axis[2], setting_.order - (job_.energy ? 1 : 2), setting_.enough, setting_.view.reach, job_.regions, job_.error}, r_.panel, r_.arena.point, points);
   return true;
 }
 

@@ -33,9 +33,7 @@ struct PanelJob {
   const Box& overlap;                 ///< finite
   std::span<const Vec3> starts;       ///< places near Sigma; each of its patches should have one
   double error;                       ///< as in ContactSettings::error
-  Regions regions;
   Vec3 reference;                     ///< that sums are about
-  bool energy;                        ///< wanted as good as the forces; else regions need only share these out
   bool graph_only;                    ///< fits only where Sigma seems to be one graph over a plane
   const PolarCover* star = nullptr;   ///< panels of a star about its origin, which holds one patch; or null: of the plane across the mean normal
   std::span<const ImprintPlace> imprint{};  ///< that may lie between nodes
@@ -48,7 +46,6 @@ struct PanelOutcome {
   double estimate = 1.0;
   double largest = 0.0;    ///< pressure [Pa]
   double thickness = 0.0;  ///< of the overlap there, to first order [m]
-  bool thirds = false;     ///< whether third bodies press as hard somewhere
 };
 
 /// Room of `solve_by_panels`, empty between calls but for its capacity.
@@ -72,27 +69,8 @@ struct PanelRoom {
   std::vector<double> value, other;
 };
 
-/// @param points  receives those of Sigma, and of the squeezed regions that `regions` asks for
+/// @param points  receives those of Sigma
 /// @return false where there is no place to start from, Sigma is nowhere positive but beneath third bodies, or it does not fit
 bool solve_by_panels(const PanelJob& job, PanelRoom& room, PatchPoints& points, PanelOutcome& out);
-
-/// Lines from points of Sigma through the squeezed regions.
-struct ColumnJob {
-  PairPressure& pressure;
-  Vec3 way;            ///< of the columns, out of A into B [unit]
-  int order;           ///< Gauss points of a column
-  double enough;       ///< of a step to a column's end [m]
-  double reach;        ///< longest step that is believed [m]
-  Regions regions;
-  double error;        ///< at which mild kinks of the bodies count
-};
-
-/// The integral of p_A over V_A, of a body that every line along the way leaves once, is the flux through Sigma of way times the integral of p_A from
-/// there to where A ends, as the divergence of that is -p_A (Gauss); so is that of B along the opposite way.
-void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<const PanelPoint> sigma, PatchPoints& points);
-
-/// Adds to the sums of a side what flows out of an apex through the places of Sigma, and the whole body where the apex is lost.
-/// @param error  relative, of what the body has
-void add_flow(PairPressure& pressure, int side, const Apex& apex, double error, PatchPoints& points);
 
 }  // namespace supple::collision
