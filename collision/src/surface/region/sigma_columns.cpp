@@ -46,9 +46,10 @@ struct Search {
 
 /// Newton's method along the columns for the zero of the body's pressure, safeguarded by halving. @return whether all end, and fall as they should there
 bool find_ends(PairPressure& pressure, int side, const Search& search, std::vector<Column>& columns) {
-  std::vector<std::size_t> open;
-  std::vector<Vec3> point, slope;
-  std::vector<double> value;
+  thread_local std::vector<std::size_t> open;
+  thread_local std::vector<Vec3> point, slope;
+  thread_local std::vector<double> value;
+  open.clear();
   for (std::size_t i = 0; i < columns.size(); ++i) open.push_back(i);
   bool lead_out = true;
   for (int step = 0; step < kBracketSteps && !open.empty(); ++step) {
@@ -121,8 +122,9 @@ void add_columns(const ColumnJob& job, std::span<const Panel> panels, std::span<
 void add_flow(PairPressure& pressure, int side, const Apex& apex, double error, PatchPoints& points) {
   constexpr double kStep = 0.03;  // of a step, over the feature size and the root of the error: ends are off by its square
   const double sign = side == 0 ? 1.0 : -1.0, reach = 0.5 * pressure.feature_size();
-  std::vector<Column> columns;
-  std::vector<double> value;
+  thread_local std::vector<Column> columns;
+  thread_local std::vector<double> value;
+  columns.clear();
   for (std::size_t i = 0; i < points.point.size(); ++i) {
     const Vec3& at = points.point[i];
     const Vec3 way = apex.way(at);
