@@ -126,8 +126,10 @@ class PairPressure {
 
   /// Whether the box may hold a place where both bodies press, and equally hard, by their bounds. @param least  by more than that [Pa]
   [[nodiscard]] bool may_meet(const Box& box, double least = 0.0) const {
-    const Interval a = field_[0].bound(box), b = field_[1].bound(box);
-    return modulus_[0] * a.upper > least && modulus_[1] * b.upper > least && modulus_[0] * a.lower <= modulus_[1] * b.upper && modulus_[1] * b.lower <= modulus_[0] * a.upper;
+    const Interval a = field_[0].bound(box);
+    if (!(modulus_[0] * a.upper > least)) return false;
+    const Interval b = field_[1].bound(box);
+    return modulus_[1] * b.upper > least && modulus_[0] * a.lower <= modulus_[1] * b.upper && modulus_[1] * b.lower <= modulus_[0] * a.upper;
   }
 
   /// Appends where derivatives of either pressure jump, as far as the fields tell. @return whether these are all

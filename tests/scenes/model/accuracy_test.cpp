@@ -306,6 +306,33 @@ objects:
   EXPECT_NEAR(error(8) / error(16), 4.0, 0.2);
 }
 
+// The adaptive method chooses its steps by itself, however long those are that it is given.
+TEST(StageErrors, OfTimeAreAboutThoseOfTheAdaptiveMethod) {
+  const auto scene = [](const std::string& tolerance) {
+    return R"(
+schema: 1
+duration: 2 s
+frame_rate: 24
+integrator: {method: adaptive, tolerance: )" + tolerance + R"(}
+objects:
+  - name: pair
+    particles: {arrange: line, count: 2, spacing: 1, spin: [0, 0, 2], mass: 1, inertia_radius: 0.1}
+    interactions: [{law: bond_frame, stretch: 400, rotation: 1}]
+)";
+  };
+  const auto end = [&scene](const std::string& tolerance) {
+    Simulation simulation(read(scene(tolerance)));
+    while (simulation.frame() < 48) simulation.step_frame();
+    return Vec3(simulation.state().particles.position[0]);
+  };
+  const Vec3 exact = end("1e-12");
+  for (const std::string tolerance : {"1e-3", "1e-4", "1e-5"}) {
+    const double error = (end(tolerance) - exact).norm(), estimate = errors_of(scene(tolerance)).at("errors").at("time").at("position_m").get<double>();
+    EXPECT_GE(estimate, 0.1 * error) << tolerance;  // three frames of 48 tell no more than the order of magnitude
+    EXPECT_LE(estimate, 10.0 * error) << tolerance;
+  }
+}
+
 TEST(StageErrors, OfTimeDoNotGrowWhileBodiesRest) {
   // The ball rests after half a second: what its speed erred by as it fell is gone.
   const auto estimate = [](const std::string& duration) {

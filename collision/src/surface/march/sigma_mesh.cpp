@@ -77,10 +77,20 @@ Vec3 SigmaMesher::place(Key key) const {
   return origin_ + axes_ * (cell_ * Vec3(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])));
 }
 
-/// Cells in which both bodies may press equally, from larger blocks down, and their neighbours: what the images of triangles at
-/// the border leave out then lies where nobody presses.
+/// Of a block of cells. @param key  of the block   @param side  its, before `axes_` @param beside  how much larger each way, in its sides
+Box SigmaMesher::box_of(Key key, double side, double beside) const {
+  const Place at = place_of(key);
+  const Vec3 low(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2]));
+  const Vec3 centre = origin_ + axes_ * (side * (low + Vec3::Constant(0.5))), half = axes_.cwiseAbs() * Vec3::Constant((0.5 + beside) * side);
+  Box box;
+  box.lower = centre - half;
+  box.upper = centre + half;
+  return box;
+}
+
+/// Cells of blocks in which both bodies may press equally, and their neighbours.
 bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap) {
-  unsigned level = 0;
+  unsigned level = 1;
   const double reach = (overlap.centre() - origin_).norm() + 0.5 * overlap.extent().norm();
   while (std::ldexp(cell_, static_cast<int>(level)) < reach) {
     if (++level + 2 >= kBits) return false;
@@ -90,18 +100,12 @@ bool SigmaMesher::find_cells(const PairPressure& pressure, const Box& overlap) {
     const auto k = corner(c);
     cells_.push_back(key_of({k[0] - 1, k[1] - 1, k[2] - 1}));
   }
-  for (;; --level) {
+  for (; level > 0; --level) {
     const double side = std::ldexp(cell_, static_cast<int>(level));
     std::erase_if(cells_, [&](Key key) {
-      const Place at = place_of(key);
-      Box box;
-      const Vec3 low(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2]));
-      const Vec3 centre = origin_ + axes_ * (side * (low + Vec3::Constant(0.5))), half = axes_.cwiseAbs() * Vec3::Constant(0.5 * side);
-      box.lower = centre - half;
-      box.upper = centre + half;
+      const Box box = box_of(key, side, 0.0);
       return !box.overlaps(overlap) || !pressure.may_meet(box);
     });
-    if (level == 0) break;
     if (cells_.size() > kMostCells / 8) return false;
     near_.clear();
     for (const Key key : cells_) {
@@ -130,7 +134,9 @@ void SigmaMesher::find_nodes(PairPressure& pressure) {
   pressure.evaluate_values(node_);
 }
 
-void SigmaMesher::cut_cells(SigmaMesh& out) {
+/// @param overlap  holds all of Sigma that presses: what the images of triangles at the border leave out lies where nobody does, as all cells are cut that
+///                 touch one in which the bodies may press equally
+void SigmaMesher::cut_cells(const PairPressure& pressure, const Box& overlap, SigmaMesh& out) {
   // Six tetrahedra around the main diagonal of a cell: one for each order of the axes.
   constexpr std::array<std::array<std::size_t, 2>, 6> kPaths{{{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}}};
   cuts_.clear();  // three a triangle
@@ -158,6 +164,11 @@ void SigmaMesher::cut_cells(SigmaMesh& out) {
     }
     for (std::size_t c = 0; c < 8; ++c) above[c] = node_.a[node[c]] >= node_.b[node[c]];
     if (std::equal(above.begin() + 1, above.end(), above.begin())) continue;
+    const auto presses = [this](std::uint32_t n) { return node_.a[n] > 0.0 && node_.b[n] > 0.0; };
+    if (std::none_of(node.begin(), node.end(), presses)) {
+      const Box near = box_of(key, cell_, 1.0);
+      if (!near.overlaps(overlap) || !pressure.may_meet(near)) continue;
+    }
     const bool reversed = mirrored_ && (at[0] < 0) != (at[1] < 0);
     for (const auto& path : kPaths) {
       std::array<std::size_t, 4> up, down;
@@ -272,7 +283,7 @@ bool SigmaMesher::mesh(PairPressure& pressure, const Box& overlap, double cell, 
   lay_lattice(pressure, overlap, cell, axis, flat);
   if (!find_cells(pressure, overlap)) return false;
   find_nodes(pressure);
-  cut_cells(out);
+  cut_cells(pressure, overlap, out);
   place_vertices(pressure, out);
   return true;
 }

@@ -41,9 +41,10 @@ class SigmaMesher {
   using Key = std::uint64_t;
   void lay_lattice(const PairPressure& pressure, const Box& overlap, double cell, const std::optional<CommonAxis>& axis,
                    const std::optional<FlatCells>& flat);
+  [[nodiscard]] Box box_of(Key key, double side, double beside) const;
   bool find_cells(const PairPressure& pressure, const Box& overlap);
   void find_nodes(PairPressure& pressure);
-  void cut_cells(SigmaMesh& out);
+  void cut_cells(const PairPressure& pressure, const Box& overlap, SigmaMesh& out);
   void place_vertices(PairPressure& pressure, SigmaMesh& out);
   [[nodiscard]] Vec3 place(Key key) const;
 

@@ -26,9 +26,10 @@ struct Column {
 bool find_ends(PairPressure& pressure, int side, double error, double reach, std::vector<Column>& columns) {
   constexpr double kStep = 0.03;  // over the longest step and the root of the error: ends are off by its square
   const double enough = kStep * std::sqrt(error) * reach;
-  std::vector<std::size_t> open;
-  std::vector<Vec3> point, slope;
-  std::vector<double> value;
+  thread_local std::vector<std::size_t> open;
+  thread_local std::vector<Vec3> point, slope;
+  thread_local std::vector<double> value;
+  open.clear();
   for (std::size_t i = 0; i < columns.size(); ++i) open.push_back(i);
   bool lead_out = true;
   for (int step = 0; step < kBracketSteps && !open.empty(); ++step) {
@@ -87,8 +88,10 @@ bool start_parallel(PairPressure& pressure, int side, double reach, const PatchP
   const double length = force.norm();
   if (!(length > 0.0)) return false;
   const Vec3 way = sign / length * force;
-  std::vector<Vec3> slope(points.point.size());
-  std::vector<double> value(points.point.size());
+  thread_local std::vector<Vec3> slope;
+  thread_local std::vector<double> value;
+  slope.resize(points.point.size());
+  value.resize(points.point.size());
   pressure.evaluate(side, points.point, value, slope);
   for (std::size_t i = 0; i < points.point.size(); ++i) {
     const double fall = -slope[i].dot(way);
@@ -104,8 +107,11 @@ bool start_falls(PairPressure& pressure, int side, double reach, const PatchPoin
   constexpr std::size_t kPlaces = 5;    // a point, and two beside it along each of two tangents
   const double h = kDifference * pressure.feature_size(), sign = side == 0 ? 1.0 : -1.0;
   const std::size_t n = points.point.size();
-  std::vector<Vec3> place, slope(kPlaces * n);
-  std::vector<double> value(kPlaces * n);
+  thread_local std::vector<Vec3> place, slope;
+  thread_local std::vector<double> value;
+  place.clear();
+  slope.resize(kPlaces * n);
+  value.resize(kPlaces * n);
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3& x = points.point[i];
     const Vec3 u = points.normal[i].unitOrthogonal(), v = points.normal[i].cross(u);
@@ -180,9 +186,9 @@ bool add_columns(const ColumnJob& job, PatchPoints& points) {
   const auto& [pressure, side, third, region, error] = job;
   const double reach = 0.5 * pressure.feature_size();
   const std::size_t begin = points.volume_point.size();
-  std::vector<Column> columns;
-  std::vector<double> value;
-  std::vector<Vec3> slope;
+  thread_local std::vector<Column> columns;
+  thread_local std::vector<double> value;
+  thread_local std::vector<Vec3> slope;
   ColumnKinks kinks(pressure, side, error);
   for (const auto start : {start_parallel, start_falls}) {
     columns.clear();
@@ -210,8 +216,9 @@ bool add_columns(const ColumnJob& job, PatchPoints& points) {
 
 void add_flow(PairPressure& pressure, int side, const Apex& apex, double error, PatchPoints& points) {
   const double sign = side == 0 ? 1.0 : -1.0, reach = 0.5 * pressure.feature_size();
-  std::vector<Column> columns;
-  std::vector<double> value;
+  thread_local std::vector<Column> columns;
+  thread_local std::vector<double> value;
+  columns.clear();
   for (std::size_t i = 0; i < points.point.size(); ++i) {
     const Vec3& at = points.point[i];
     const Vec3 way = apex.way(at);

@@ -13,6 +13,7 @@ constexpr std::array<int, 2> kEvery{16, 6};  // one in so many frames is simulat
 constexpr int kEveryOfContact = 3;          // of these, with a finer contact.error, which costs several times as much
 constexpr double kFinerContact = 0.1;       // times contact.error
 constexpr double kFinestContact = 1e-10;    // smallest contact.error
+constexpr double kFinerTolerance = 1e-2;    // times integrator.tolerance of the adaptive method: what is left of its errors, about
 constexpr double kMostWork = 0.1;           // of that of the run, for each stage
 
 /// Contact points of all steps so far.
@@ -65,7 +66,8 @@ double StageErrorEstimator::end(const Simulation& simulation) {
   work_ = static_cast<double>(work_of(simulation) - before_work_);
   all_work_ += work_;
   const double began = thread_cpu_seconds();
-  const bool whole = simulation.state().halvings == 0;
+  const core::IntegratorSettings& integrator = simulation.integrator().settings;
+  const bool adaptive = integrator.method == core::Integrator::Adaptive, whole = adaptive || simulation.state().halvings == 0;
   const double error = contact_error(scene_), finer_contact = std::max(kFinestContact, kFinerContact * error);
   Variant& time = whole ? finer_ : coarser_;
   const int seen = seen_[kind_]++, sample = seen / kEvery[kind_];
@@ -75,9 +77,11 @@ double StageErrorEstimator::end(const Simulation& simulation) {
     contact_.due[kind_] = contact_.due[kind_] || (accuracy_of(scene_) && finer_contact < error && (sample == 0 || sample % kEveryOfContact == 1));
   }
   // Of order p: steps twice as long err by 2^p e, half as long by 2^-p e.
-  const double ratio = simulation.integrator().settings.method == core::Integrator::BackwardEuler ? 2.0 : 4.0;
-  compare_if_due(simulation, {whole ? 1 : -1, error, whole ? ratio / (ratio - 1.0) : 1.0 / (ratio - 1.0)}, time);
-  compare_if_due(simulation, {0, finer_contact, 1.0}, contact_);
+  const double ratio = integrator.method == core::Integrator::BackwardEuler ? 2.0 : 4.0;
+  const std::optional<double> kept = scene_.integrator.tolerance;
+  if (adaptive) compare_if_due(simulation, {0, error, kFinerTolerance * integrator.tolerance, 1.0 / (1.0 - kFinerTolerance)}, time);
+  else compare_if_due(simulation, {whole ? 1 : -1, error, kept, whole ? ratio / (ratio - 1.0) : 1.0 / (ratio - 1.0)}, time);
+  compare_if_due(simulation, {0, finer_contact, kept, 1.0}, contact_);
   return thread_cpu_seconds() - began;
 }
 
@@ -93,6 +97,7 @@ void StageErrorEstimator::compare(const Simulation& simulation, const Change& ch
     if (!variant.simulation) {
       Scene scene = scene_;
       scene.contact.error = change.contact_error;
+      scene.integrator.tolerance = change.tolerance;
       SimulationOptions options = options_;
       options.finer = change.finer;
       variant.simulation.emplace(std::move(scene), options);

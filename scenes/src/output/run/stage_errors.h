@@ -1,6 +1,7 @@
 /// @file stage_errors.h
 /// Estimates the error of positions that each stage of a run causes. A sample of the frames with contact, and one of those without, is simulated again from
-/// the state before: with steps twice as long (half as long where a frame is one step) and, of scenes with an accuracy, given or by default, with a tenth of contact.error.
+/// the state before: with steps twice as long (half as long where a frame is one step; the adaptive method with a hundredth of its tolerance) and, of scenes
+/// with an accuracy, given or by default, with a tenth of contact.error.
 /// But for the first of each kind, a frame for which the work on either of these would exceed a tenth of that of the run so far is passed over for the next one.
 #pragma once
 
@@ -30,6 +31,7 @@ class StageErrorEstimator {
   struct Change {
     int finer = 0;                ///< halvings of the step
     double contact_error = 0.0;   ///< relative
+    std::optional<double> tolerance;  ///< integrator.tolerance
     double share = 1.0;           ///< error of the run, over the difference
   };
   /// An object in the second simulation of a frame.
