@@ -179,7 +179,7 @@ Soup read_data(const std::filesystem::path& file, const FitOptions& options, Rep
     return soup_of(surface_of_volume(file, std::move(volume), options, repair, executor));
   }
   if (kind == DataKind::Mesh) return read_soup(file);
-  return soup_of(surface_through_points(file, options.error, repair));
+  return soup_of(surface_through_points(file, options.error, repair, executor));
 }
 
 /// What a closed mesh encloses: less than 0 where its faces are turned inward, 0 where it is as good as flat. CGAL's own test of the orientation looks at the
