@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "fit/shapes.h"
+#include "supple/core/error.h"
 
 namespace supple::fit {
 namespace {
@@ -153,6 +154,10 @@ TEST(Fit, KeepsTheLargestOfSeveralPieces) {
   EXPECT_EQ(object.report.repair.pieces, 2U);
   EXPECT_NEAR(object.report.volume, 4.0 / 3.0 * std::numbers::pi * 0.125, 0.05);
   EXPECT_LT((object.origin - Vec3(3.0, 0.0, 0.0)).norm(), 1e-6);
+  const FittedObject other = fit(test::saved(mesh, "two"), {.error = 0.1, .particles = 1, .pieces = Pieces::Largest, .piece = 2});
+  EXPECT_NEAR(other.report.volume, 4.0 / 3.0 * std::numbers::pi * 0.008, 0.005);
+  EXPECT_LT(other.origin.norm(), 1e-6);
+  EXPECT_THROW((void)fit(test::saved(mesh, "two"), {.error = 0.1, .particles = 1, .pieces = Pieces::Largest, .piece = 3}), Error);
 }
 
 }  // namespace

@@ -18,10 +18,9 @@ std::vector<Blob> blobs_of(std::span<const Ball> balls) {
   return out;
 }
 
-/// Blobs that no sample needs are dropped: those whose share of the field stays small wherever it is compared with the data, and those that began thinner than
-/// the thinnest and were reached by no step. @param smallest  of semi-axes
-void prune(std::vector<Blob>& blobs, const Targets& targets, double smallest) {
-  constexpr double kLeast = 0.01, kRounding = 1.0 - 1e-9;
+/// Blobs that no sample needs are dropped: those whose share of the field stays small wherever it is compared with the data.
+void prune(std::vector<Blob>& blobs, const Targets& targets) {
+  constexpr double kLeast = 0.01;
   implicit::Field field;
   build_field(blobs, field);
   std::vector<double> largest(blobs.size(), 0.0);
@@ -32,7 +31,7 @@ void prune(std::vector<Blob>& blobs, const Targets& targets, double smallest) {
   }
   std::vector<Blob> kept;
   for (std::size_t k = 0; k < blobs.size(); ++k) {
-    if (largest[k] >= kLeast && blobs[k].axes.minCoeff() > kRounding * smallest) kept.push_back(blobs[k]);
+    if (largest[k] >= kLeast) kept.push_back(blobs[k]);
   }
   blobs = std::move(kept);
 }
@@ -105,7 +104,7 @@ Faults mend(const Data& data, double error, std::uint32_t most_blobs, const Solv
     heed_scope();
     balance(blobs, targets, solving, executor);
     solve(blobs, targets, solving, executor);
-    prune(blobs, targets, solving.smallest);
+    prune(blobs, targets);
     implicit::Field field;
     build_field(blobs, field);
     const Faults faults = find_faults(data, field, out.cell, most, executor);
@@ -162,6 +161,9 @@ FoundSkeleton find_skeleton(const Data& data, double error, std::uint32_t most, 
   for (const double level : kNextLevels) {
     if (level <= last) thin_to(level, kFurtherAttempts);
   }
+  // Balls that began thinner than the thinnest and that no step reached: the surface does not show them.
+  constexpr double kRounding = 1.0 - 1e-9;
+  std::erase_if(out.blobs, [&](const Blob& blob) { return (blob.form == Form::Segment ? blob.axes.y() : blob.axes.minCoeff()) < kRounding * solving.smallest; });
   return out;
 }
 

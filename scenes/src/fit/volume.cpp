@@ -124,17 +124,15 @@ Reduced reduce(const Volume& volume, const Choice& choice, const Box& box, doubl
 }
 
 /// One piece without cavities.
-void clean(const std::filesystem::path& file, GridField& field, Pieces pieces, Repair& repair) {
+void clean(const std::filesystem::path& file, GridField& field, const FitOptions& options, Repair& repair) {
   std::vector<std::uint32_t> part;
   const std::vector<std::size_t> size = parts_of(field, true, part);
   repair.pieces = size.size();
   if (size.empty()) refuse(file, "expected an inside thicker than a third of the error", "none", "ask for a smaller --error");
-  if (size.size() > 1) {
-    if (pieces == Pieces::Refuse) refuse(file, "expected voxels in one piece", std::to_string(size.size()) + " pieces", "choose the largest by --pieces largest");
-    const auto largest = static_cast<std::uint32_t>(std::max_element(size.begin(), size.end()) - size.begin());
-    for (std::size_t n = 0; n < part.size(); ++n) {
-      if (part[n] != largest && part[n] != kNoPart) field.value[n] = -field.value[n];
-    }
+  if (size.size() > 1 && options.pieces == Pieces::Refuse) refuse(file, "expected voxels in one piece", std::to_string(size.size()) + " pieces", kPiecesHint);
+  const std::size_t kept = piece_of(file, std::vector<double>(size.begin(), size.end()), options.pieces == Pieces::Refuse ? 1 : options.piece);
+  for (std::size_t n = 0; n < part.size(); ++n) {
+    if (part[n] != kept && part[n] != kNoPart) field.value[n] = -field.value[n];
   }
   repair.cavities = fill_cavities(field);
 }
@@ -164,7 +162,7 @@ Mesh surface_of_volume(const std::filesystem::path& file, Volume volume, const F
   heed_scope();
   Reduced reduced = reduce(volume, choice, box, options.error);
   volume.value = {};
-  clean(file, reduced.field, options.pieces, repair);
+  clean(file, reduced.field, options, repair);
   heed_scope();
   Mesh mesh = surface_of_grid(reduced.field, executor);
   for (Vec3& p : mesh.position) p = volume.origin + volume.axes * reduced.index_of(p);
