@@ -25,7 +25,7 @@ constexpr std::array<Group, 19> kGroups{{
     {"core", "core_bench", "particle loops, lists and whole steps (melt, surface, lists, spiral, threads)", true},
     {"core/integrators", "integrator_bench", "time against error of every integrator; with a file name: plot (SVG)"},
     {"core/stability", "core_stress", "largest stable steps; with a file name: map (SVG)"},
-    {"implicit", "field_bench", "fields (few, w1, w2, w3, w4)", true},
+    {"implicit", "field_bench", "fields (few, fit, w1, w2, w3, w4)", true},
     {"implicit/mesh", "mesh_bench", "surface meshes and their errors (w1/64 to w4/512)", true},
     {"collision", "contact_bench", "one contact query: time, points and error; with a file name: also the plot of collision/rules"},
     {"collision/poses", "contact_poses", "contact queries in random poses: worst time and error; arguments: number of poses, case"},

@@ -42,6 +42,13 @@ std::optional<std::array<double, 2>> window_in(const std::string& text) {
 
 }  // namespace
 
+std::optional<std::uint32_t> piece_in(const std::string& text) {
+  if (text == "largest") return 1;
+  std::uint32_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() && number > 0 ? std::optional(number) : std::nullopt;
+}
+
 CLI::App* add_fit(CLI::App& app, FitArguments& a) {
   CLI::App* verb = app.add_subcommand("fit", kFitMeaning);
   add_fit_options(*verb, a);
@@ -59,7 +66,8 @@ void add_fit_options(CLI::App& verb, FitArguments& a) {
   verb.add_option("--kind", a.kind, "solid (default), or shell: a layer about a surface, which may be open")->check(CLI::IsMember({"solid", "shell"}));
   verb.add_option("--thickness", a.thickness, "of a shell [m] (default: a third of the distance between particles)");
   verb.add_option("--material", a.material, "of the object: the name of a material of supple:materials (jelly, rubber ...), or a file of scenes with the key 'material'");
-  verb.add_option("--pieces", a.pieces, "data of several pieces: refuse (default) or largest")->check(CLI::IsMember({"refuse", "largest"}));
+  verb.add_option("--pieces", a.pieces, "data of several pieces: refuse (default), largest, or the number of one counted from the largest")
+      ->check([](const std::string& text) { return text == "refuse" || piece_in(text) ? std::string() : "expected refuse, largest or a number from 1, found " + text; });
   verb.add_option("--iso", a.iso, "of a volume: values above lie inside");
   verb.add_option_function<std::string>("--window", [&a](const std::string& text) { a.window = window_in(text); }, "of a volume: values FROM:TO lie inside")
       ->check([](const std::string& text) { return window_in(text) ? std::string() : "expected two values such as 100:300, found " + text; });

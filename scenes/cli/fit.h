@@ -24,6 +24,9 @@ struct FitArguments {
   bool overwrite = false, quiet = false;
 };
 
+/// Which piece the option --pieces names: 1 for "largest"; none for other words than numbers from 1.
+[[nodiscard]] std::optional<std::uint32_t> piece_in(const std::string& text);
+
 inline constexpr const char* kFitMeaning = "make an object for scenes from a mesh, points or a volume";
 
 /// Adds the command with its options.

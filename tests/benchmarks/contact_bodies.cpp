@@ -197,16 +197,18 @@ int supple::benchmarks::programs::contact_bodies(int argc, char** argv) {
       return std::array<collision::ContactBody, 2>{upper.body(), lower.body()};
     });
   }
-  for (const std::string_view under : {"box", "plane", "edge"}) {
-    const std::string name = "limbs_32_on_" + std::string(under);
-    if (!wanted(name)) continue;
-    Parts parts = limbs(32);
-    const std::vector<Pose> rest = parts.pose;
-    const implicit::SolidBox box = support(under);
-    measure(name, poses, rule, seed, reference, [&](Draw& draw) {
-      lay(parts, rest, draw);
-      return std::array<collision::ContactBody, 2>{parts.body(), under == "plane" ? obstacle(plane) : obstacle(box)};
-    });
+  for (const auto& [kind, shape] : {std::pair{"limbs", implicit::ShapeKind::Ellipsoid}, {"balls", implicit::ShapeKind::Point}}) {
+    for (const std::string_view under : {"box", "plane", "edge"}) {
+      const std::string name = std::string(kind) + "_32_on_" + std::string(under);
+      if (!wanted(name)) continue;
+      Parts parts = limbs(32, shape);
+      const std::vector<Pose> rest = parts.pose;
+      const implicit::SolidBox box = support(under);
+      measure(name, poses, rule, seed, reference, [&](Draw& draw) {
+        lay(parts, rest, draw);
+        return std::array<collision::ContactBody, 2>{parts.body(), under == "plane" ? obstacle(plane) : obstacle(box)};
+      });
+    }
   }
   return 0;
 }

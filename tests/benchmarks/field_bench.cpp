@@ -204,7 +204,7 @@ int supple::benchmarks::programs::field_bench(int argc, char** argv) {
   constexpr std::string_view kUsage = "field_bench [PREFIX]    prefix of the names to run, e.g. w3/values";
   supple::benchmarks::answer_usage(argc, argv, kUsage, 1);
   const std::string_view filter = argc > 1 ? argv[1] : "";
-  constexpr std::array<std::string_view, 5> kFirst{"few/", "w1/", "w2/", "w3/", "w4/"};
+  constexpr std::array<std::string_view, 6> kFirst{"few/", "fit/", "w1/", "w2/", "w3/", "w4/"};
   if (std::none_of(kFirst.begin(), kFirst.end(), [filter](std::string_view first) { return wanted(filter, first); })) {
     supple::benchmarks::refuse(kUsage, "a prefix of a name, such as w3/values", filter);
   }
@@ -213,6 +213,11 @@ int supple::benchmarks::programs::field_bench(int argc, char** argv) {
       measure_few(filter, count, ShapeKind::Point);
       measure_few(filter, count, ShapeKind::Rectangle);
     }
+  }
+  for (const auto& [name, shape] : {std::pair{"fit/ellipsoids", ShapeKind::Ellipsoid}, {"fit/points", ShapeKind::Point}}) {
+    if (!wanted(filter, std::string(name) + "/")) continue;
+    Body body = benchmarks::ellipsoids(64, shape);
+    measure_body(filter, name, body, 3.0 / 256);
   }
   if (wanted(filter, "w1/")) {
     Body spiral = plate_spiral();

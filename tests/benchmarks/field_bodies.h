@@ -93,6 +93,22 @@ inline Body capsules(std::uint32_t count) {
   return body;
 }
 
+/// As many primitives as fits have overlap: ellipsoids turned every way, or points of the same volumes in their places.
+inline Body ellipsoids(std::uint32_t count, ShapeKind shape = ShapeKind::Ellipsoid) {
+  Body body = filled_ball(count, 6.0, [shape](double R) {
+    Primitive p;
+    p.shape = shape;
+    const bool ball = shape == ShapeKind::Point;
+    if (!ball) p.size = R * Vec3(1.6, 1.0, 0.625);
+    p.kernel = Kernel::wyvill(ball ? R : 0.625 * R);
+    return p;
+  });
+  implicit::testing::Random random(11);
+  for (Pose& part : body.parts) part.orientation = random.rotation();
+  body.place();
+  return body;
+}
+
 /// Wyvill blobs of which near ones unite, some with a blend and some at an angle.
 inline Body united_blobs(std::uint32_t count) {
   Body body = filled_ball(count, 8.0, [](double R) {

@@ -2,6 +2,7 @@
 /// Bodies of many primitives, for benchmarks and tests.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -45,8 +46,8 @@ struct Parts {
   }
 };
 
-/// A body such as fits make: ellipsoids of many sizes, each near an earlier one.
-inline Parts limbs(std::uint32_t count) {
+/// A body such as fits make: ellipsoids of many sizes, each near an earlier one, or points of the same volumes in their places.
+inline Parts limbs(std::uint32_t count, implicit::ShapeKind shape = implicit::ShapeKind::Ellipsoid) {
   constexpr double kLeast = 0.04, kMost = 0.2, kLongest = 3.0, kApart = 0.3;  // supports [m], long over thin, and between middles over the size
   Draw draw(count);
   implicit::Skeleton skeleton;
@@ -55,11 +56,13 @@ inline Parts limbs(std::uint32_t count) {
   for (std::uint32_t k = 0; k < count; ++k) {
     implicit::Primitive& p = skeleton.primitive.emplace_back();
     p.part = k;
-    p.shape = implicit::ShapeKind::Ellipsoid;
+    p.shape = shape;
     const double size = draw.logarithmic(kLeast, kMost);
-    p.size = size * Vec3(1.0, draw.uniform(1.0, kLongest), draw.uniform(1.0, kLongest));
-    p.kernel = implicit::Kernel::wyvill(1.0);
-    const Vec3 beside = k == 0 ? Vec3::Zero().eval() : Vec3(pose[static_cast<std::size_t>(draw.uniform(0.0, k))].position + kApart * p.size.maxCoeff() * draw.direction());
+    const Vec3 axes = size * Vec3(1.0, draw.uniform(1.0, kLongest), draw.uniform(1.0, kLongest));
+    const bool ball = shape == implicit::ShapeKind::Point;
+    if (!ball) p.size = axes;
+    p.kernel = implicit::Kernel::wyvill(ball ? std::cbrt(axes.prod()) : 1.0);
+    const Vec3 beside = k == 0 ? Vec3::Zero().eval() : Vec3(pose[static_cast<std::size_t>(draw.uniform(0.0, k))].position + kApart * axes.maxCoeff() * draw.direction());
     pose.push_back({beside, draw.rotation()});
   }
   Parts parts(std::move(skeleton), 0.012);

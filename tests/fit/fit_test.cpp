@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "fit/shapes.h"
+#include "supple/core/error.h"
 
 namespace supple::fit {
 namespace {
@@ -70,23 +71,14 @@ TEST(Fit, CoarserErrorsTakeFewerPrimitives) {
   }
 }
 
-TEST(Fit, CoarserErrorsNeverTakeMorePrimitives) {
-  // A ring of six beads whose hole is small: it closes before any distance is large.
-  Mesh mesh = test::torus(1.0, 0.5, 120, 48);
-  for (Vec3& p : mesh.position) {
-    const double angle = std::atan2(p.y(), p.x());
-    const Vec3 middle(std::cos(angle), std::sin(angle), 0.0);
-    p = middle + (1.0 + 0.4 * std::cos(6.0 * angle)) * (p - middle);
-  }
-  const auto file = test::saved(mesh, "beads");
-  std::size_t finer = 10000;
-  for (const double error : {0.02, 0.05}) {
-    const FitReport r = fit(file, {.error = error, .particles = 12}).report;
-    EXPECT_TRUE(r.within) << error;
-    EXPECT_EQ(r.genus_out, 1) << error;
-    EXPECT_LE(r.primitives, finer) << error;
-    finer = r.primitives;
-  }
+TEST(Fit, CoarserErrorsBeginWithTheFinerOnes) {
+  const Mesh mesh = test::torus(1.0, 0.35, 48, 24);
+  const auto file = test::saved(mesh, "levels");
+  const auto primitives = [&file](double error) { return fit(file, {.error = error, .particles = 1}).primitives; };
+  const std::vector<FittedPrimitive> finer = primitives(0.02), between = primitives(0.029), coarser = primitives(0.03);
+  ASSERT_EQ(between.size(), finer.size());
+  for (std::size_t k = 0; k < finer.size(); ++k) EXPECT_EQ(between[k].semi_axes, finer[k].semi_axes);
+  EXPECT_LE(coarser.size(), finer.size());
 }
 
 TEST(Fit, RodsTakeSegments) {
@@ -162,6 +154,10 @@ TEST(Fit, KeepsTheLargestOfSeveralPieces) {
   EXPECT_EQ(object.report.repair.pieces, 2U);
   EXPECT_NEAR(object.report.volume, 4.0 / 3.0 * std::numbers::pi * 0.125, 0.05);
   EXPECT_LT((object.origin - Vec3(3.0, 0.0, 0.0)).norm(), 1e-6);
+  const FittedObject other = fit(test::saved(mesh, "two"), {.error = 0.1, .particles = 1, .pieces = Pieces::Largest, .piece = 2});
+  EXPECT_NEAR(other.report.volume, 4.0 / 3.0 * std::numbers::pi * 0.008, 0.005);
+  EXPECT_LT(other.origin.norm(), 1e-6);
+  EXPECT_THROW((void)fit(test::saved(mesh, "two"), {.error = 0.1, .particles = 1, .pieces = Pieces::Largest, .piece = 3}), Error);
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ TEST(FitRefuses, ThreeTrianglesAtAnEdge) {
 
 TEST(FitRefuses, SeveralPieces) {
   EXPECT_EQ(message("pieces.off", off(kTetrahedron + "5 0 0\n6 0 0\n5 1 0\n5 0 1\n", "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n3 4 6 5\n3 4 5 7\n3 5 6 7\n3 6 4 7\n")),
-            "pieces.off: expected a mesh in one piece, found 2 pieces; choose the largest by --pieces largest");
+            "pieces.off: expected a mesh in one piece, found 2 pieces; choose the largest by --pieces largest, others by --pieces 2 and so on");
 }
 
 TEST(FitRefuses, OptionsOutOfRange) {

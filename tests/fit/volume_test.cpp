@@ -242,12 +242,17 @@ TEST(FitVolume, KeepsTheLargestPieceAndTellsWhereItIsCut) {
   std::vector<std::int16_t> values = ball();
   for (std::size_t k = 0; k < 3; ++k) values[k] = 100;  // in a corner
   const auto file = written("pieces.mha", kMeta + "ElementDataFile = LOCAL\n" + bytes_of(values));
-  EXPECT_EQ(message(file), "pieces.mha: expected voxels in one piece, found 2 pieces; choose the largest by --pieces largest");
+  EXPECT_EQ(message(file), "pieces.mha: expected voxels in one piece, found 2 pieces; choose the largest by --pieces largest, others by --pieces 2 and so on");
   Repair repair;
   FitOptions options{.error = 0.01, .pieces = Pieces::Largest, .volume = kInside};
   EXPECT_NEAR(inspect(read(file, options, repair)).volume / (4.0 / 3.0 * std::numbers::pi * 8e-6), 1.0, 0.02);
   EXPECT_EQ(repair.pieces, 2U);
   EXPECT_TRUE(repair.cut);
+  options.piece = 2;
+  EXPECT_LT(inspect(read(file, options, repair)).volume, 8e-8);
+  options.piece = 3;
+  EXPECT_THROW((void)read(file, options, repair), Error);
+  options.piece = 1;
   repair = {};
   options.volume = {.iso = -150.0};
   EXPECT_TRUE(inspect(read(written("cut.mha", kMeta + "ElementDataFile = LOCAL\n" + bytes_of(ball())), options, repair)).closed);

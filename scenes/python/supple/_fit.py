@@ -13,7 +13,7 @@ def fit(data, out, *, error=0.01, particles=200, primitives=2000, pieces="refuse
     error       largest distance between the surfaces, either way, over the diagonal of the data's box
     particles   number of particles
     primitives  largest number of primitives of the skeleton
-    pieces      of data in several pieces: "refuse" or "largest"
+    pieces      of data in several pieces: "refuse", "largest", or the number of one counted from the largest
     iso         of a volume: values above lie inside
     window      of a volume: values between two, a pair, lie inside
     label       of a volume: voxels of this number lie inside
@@ -26,7 +26,7 @@ def fit(data, out, *, error=0.01, particles=200, primitives=2000, pieces="refuse
 
     Raises Error for data that cannot be fitted.
     """
-    words = ["fit", data, "--out", out, "--error", repr(float(error)), "--particles", int(particles), "--primitives", int(primitives), "--pieces", pieces, "--kind", kind, "--threads", int(threads), "--quiet"]
+    words = ["fit", data, "--out", out, "--error", repr(float(error)), "--particles", int(particles), "--primitives", int(primitives), "--pieces", str(pieces), "--kind", kind, "--threads", int(threads), "--quiet"]
     # Each one word, as values may begin with a minus sign.
     if iso is not None:
         words.append(f"--iso={float(iso)!r}")

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
+#include <numeric>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -63,6 +64,14 @@ DataKind kind_of(const std::filesystem::path& file) {
 
 void refuse(const std::filesystem::path& file, std::string expected, std::string found, std::string hint, ErrorKind kind) {
   throw Error(kind, Fault{.place = file.string(), .key = {}, .expected = std::move(expected), .found = std::move(found), .hint = std::move(hint)});
+}
+
+std::size_t piece_of(const std::filesystem::path& file, const std::vector<double>& size, std::uint32_t which) {
+  if (which > size.size()) refuse(file, "expected at least " + std::to_string(which) + " pieces, of which --pieces chooses one", std::to_string(size.size()), "", ErrorKind::Usage);
+  std::vector<std::size_t> order(size.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&size](std::size_t a, std::size_t b) { return size[a] > size[b]; });
+  return order[which - 1];
 }
 
 std::string short_number(double value) {

@@ -161,6 +161,9 @@ FoundSkeleton find_skeleton(const Data& data, double error, std::uint32_t most, 
   for (const double level : kNextLevels) {
     if (level <= last) thin_to(level, kFurtherAttempts);
   }
+  // Balls that began thinner than the thinnest and that no step reached: the surface does not show them.
+  constexpr double kRounding = 1.0 - 1e-9;
+  std::erase_if(out.blobs, [&](const Blob& blob) { return (blob.form == Form::Segment ? blob.axes.y() : blob.axes.minCoeff()) < kRounding * solving.smallest; });
   return out;
 }
 

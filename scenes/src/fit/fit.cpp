@@ -34,6 +34,7 @@ void check(const FitOptions& options) {
                         material.damping_ratio <= 1.0 && material.friction >= 0.0;
   expect_range("--material", possible, "expected a modulus and a density > 0, Poisson's ratio from 0 to 0.25, a damping ratio from 0 to 1 and a friction >= 0", "others");
   expect_range("--thickness", !options.thickness || *options.thickness > 0.0, "expected a length > 0 [m]", options.thickness ? short_number(*options.thickness) : "");
+  expect_range("--pieces", options.piece >= 1, "expected a whole number of at least 1", std::to_string(options.piece));
   expect_range("--primitives", options.primitives >= 1 && options.primitives <= 10000, "expected a whole number from 1 to 10000", std::to_string(options.primitives));
 }
 

@@ -135,20 +135,21 @@ void close_holes(const std::filesystem::path& file, SurfaceMesh& mesh, Repair& r
   repair.closed_area = closed / (area + closed);
 }
 
-void keep_pieces(const std::filesystem::path& file, SurfaceMesh& mesh, Pieces pieces, Repair& repair) {
+/// @param which  of them is kept, counted from the largest
+void keep_pieces(const std::filesystem::path& file, SurfaceMesh& mesh, Pieces pieces, std::uint32_t which, Repair& repair) {
   const auto [piece, fresh] = mesh.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:piece", 0);
   const std::size_t count = pmp::connected_components(mesh, piece);
   repair.pieces = std::max(repair.pieces, count);  // what a volume had counts
-  if (count < 2) return;
-  if (pieces == Pieces::Refuse) refuse(file, "expected a mesh in one piece", std::to_string(count) + " pieces", "choose the largest by --pieces largest");
+  if (count < 2 && which == 1) return;
+  if (pieces == Pieces::Refuse) refuse(file, "expected a mesh in one piece", std::to_string(count) + " pieces", kPiecesHint);
   std::vector<double> volume(count, 0.0);
   for (const SurfaceMesh::Face_index f : mesh.faces()) {
     const auto h = mesh.halfedge(f);
     const Point a = mesh.point(mesh.source(h)), b = mesh.point(mesh.target(h)), c = mesh.point(mesh.target(mesh.next(h)));
     volume[piece[f]] += CGAL::scalar_product(a - CGAL::ORIGIN, CGAL::cross_product(b - CGAL::ORIGIN, c - CGAL::ORIGIN)) / 6.0;
   }
-  const auto larger = [](double x, double y) { return std::abs(x) < std::abs(y); };
-  const std::vector<std::size_t> kept{static_cast<std::size_t>(std::max_element(volume.begin(), volume.end(), larger) - volume.begin())};
+  for (double& v : volume) v = std::abs(v);
+  const std::vector<std::size_t> kept{piece_of(file, volume, which)};
   pmp::keep_connected_components(mesh, kept, piece);
   mesh.collect_garbage();
 }
@@ -179,7 +180,7 @@ Soup read_data(const std::filesystem::path& file, const FitOptions& options, Rep
     return soup_of(surface_of_volume(file, std::move(volume), options, repair, executor));
   }
   if (kind == DataKind::Mesh) return read_soup(file);
-  return soup_of(surface_through_points(file, options.error, repair));
+  return soup_of(surface_through_points(file, options.error, repair, executor));
 }
 
 /// What a closed mesh encloses: less than 0 where its faces are turned inward, 0 where it is as good as flat. CGAL's own test of the orientation looks at the
@@ -203,7 +204,8 @@ Mesh read_surface(const std::filesystem::path& file, const FitOptions& options, 
   pmp::triangulate_faces(mesh);
   const bool solid = options.kind == Kind::Solid;
   if (solid) close_holes(file, mesh, repair);
-  keep_pieces(file, mesh, options.pieces, repair);
+  // Of a volume one has been chosen.
+  keep_pieces(file, mesh, options.pieces, kind_of(file) == DataKind::Volume || options.pieces == Pieces::Refuse ? 1 : options.piece, repair);
   const bool closed = CGAL::is_closed(mesh);
   const double volume = closed ? enclosed_volume(mesh) : 0.0;
   if (solid && closed && volume == 0.0) refuse(file, "expected a mesh that encloses a volume", "a flat one", "fit a surface without inside by --kind shell");

@@ -4,78 +4,11 @@
 #include <cmath>
 
 #include "fit/data.h"
+#include "fit/grid_field.h"
 #include "supple/core/interrupt.h"
-#include "supple/implicit/march_cubes.h"
 
 namespace supple::fit {
 namespace {
-
-/// Values on a lattice with steps of 1 whose border is outside: F > 0 inside, linear between the nodes along each axis.
-class GridField {
- public:
-  std::array<std::size_t, 3> count{};
-  std::vector<float> value;
-
-  [[nodiscard]] std::size_t at(std::size_t i, std::size_t j, std::size_t k) const { return (k * count[1] + j) * count[0] + i; }
-
-  void evaluate(std::span<const Vec3> points, std::span<double> values) const {
-    for (std::size_t p = 0; p < points.size(); ++p) values[p] = sample(points[p], nullptr);
-  }
-  void evaluate(std::span<const Vec3> points, std::span<double> values, std::span<Vec3> gradients) const {
-    for (std::size_t p = 0; p < points.size(); ++p) values[p] = sample(points[p], &gradients[p]);
-  }
-  void evaluate_parts(std::span<const Vec3> points, implicit::FieldParts& parts) const {
-    parts = {};
-    parts.offset.assign(points.size() + 1, 0);
-  }
-  [[nodiscard]] Interval bound(const Box& box) const {
-    Interval out{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-    std::array<std::size_t, 3> first{}, last{};
-    for (int k = 0; k < 3; ++k) {
-      const auto axis = static_cast<std::size_t>(k);
-      const double most = static_cast<double>(count[axis] - 1);
-      first[axis] = static_cast<std::size_t>(std::clamp(std::floor(box.lower[k]), 0.0, most));
-      last[axis] = static_cast<std::size_t>(std::clamp(std::ceil(box.upper[k]), 0.0, most));
-    }
-    for (std::size_t k = first[2]; k <= last[2]; ++k) {
-      for (std::size_t j = first[1]; j <= last[1]; ++j) {
-        const auto [low, high] = std::minmax_element(value.begin() + static_cast<std::ptrdiff_t>(at(first[0], j, k)), value.begin() + static_cast<std::ptrdiff_t>(at(last[0], j, k) + 1));
-        out.lower = std::min<double>(out.lower, *low);
-        out.upper = std::max<double>(out.upper, *high);
-      }
-    }
-    return out;
-  }
-  [[nodiscard]] double gradient_bound(const Box& box) const {
-    const Interval range = bound(box);
-    return std::sqrt(3.0) * (range.upper - range.lower);
-  }
-  [[nodiscard]] Box surface_box() const { return {Vec3::Zero(), Vec3(static_cast<double>(count[0] - 1), static_cast<double>(count[1] - 1), static_cast<double>(count[2] - 1))}; }
-  [[nodiscard]] double feature_size() const { return 1.0; }
-
- private:
-  double sample(const Vec3& place, Vec3* gradient) const {
-    std::array<std::size_t, 3> cell{};
-    Vec3 x;
-    for (int k = 0; k < 3; ++k) {
-      const auto axis = static_cast<std::size_t>(k);
-      const double inside = std::clamp(place[k], 0.0, static_cast<double>(count[axis] - 1));
-      cell[axis] = std::min(static_cast<std::size_t>(inside), count[axis] - 2);
-      x[k] = inside - static_cast<double>(cell[axis]);
-    }
-    double sum = 0.0;
-    Vec3 slope = Vec3::Zero();
-    for (std::size_t corner = 0; corner < 8; ++corner) {
-      const std::size_t a = corner & 1, b = (corner >> 1) & 1, c = corner >> 2;
-      const double v = value[at(cell[0] + a, cell[1] + b, cell[2] + c)];
-      const Vec3 w(a != 0 ? x[0] : 1.0 - x[0], b != 0 ? x[1] : 1.0 - x[1], c != 0 ? x[2] : 1.0 - x[2]);
-      sum += v * w.prod();
-      slope += v * Vec3((a != 0 ? 1.0 : -1.0) * w[1] * w[2], (b != 0 ? 1.0 : -1.0) * w[0] * w[2], (c != 0 ? 1.0 : -1.0) * w[0] * w[1]);
-    }
-    if (gradient != nullptr) *gradient = slope;
-    return sum;
-  }
-};
 
 /// What the options ask for: 0 on the surface, more inside. Values that are no numbers lie outside.
 class Choice {
@@ -190,56 +123,18 @@ Reduced reduce(const Volume& volume, const Choice& choice, const Box& box, doubl
   return out;
 }
 
-/// Numbers of the parts in which nodes of one side hang together by faces; `kNone` on the other side. @return their sizes
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-std::vector<std::size_t> parts_of(const GridField& field, bool inside, std::vector<std::uint32_t>& part) {
-  part.assign(field.value.size(), kNone);
-  const std::array<std::size_t, 3> stride{1, field.count[0], field.count[0] * field.count[1]};
-  const auto wanted = [&](std::size_t n) { return part[n] == kNone && (field.value[n] > 0.0F) == inside; };
-  std::vector<std::size_t> size, open;
-  for (std::size_t start = 0; start < part.size(); ++start) {
-    if (!wanted(start)) continue;
-    const auto number = static_cast<std::uint32_t>(size.size());
-    size.push_back(0);
-    open.assign(1, start);
-    part[start] = number;
-    while (!open.empty()) {
-      const std::size_t n = open.back();
-      open.pop_back();
-      ++size.back();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::size_t along = n / stride[axis] % field.count[axis];
-        for (const bool up : {false, true}) {
-          if (up ? along + 1 == field.count[axis] : along == 0) continue;
-          const std::size_t next = up ? n + stride[axis] : n - stride[axis];
-          if (!wanted(next)) continue;
-          part[next] = number;
-          open.push_back(next);
-        }
-      }
-    }
-  }
-  return size;
-}
-
 /// One piece without cavities.
-void clean(const std::filesystem::path& file, GridField& field, Pieces pieces, Repair& repair) {
+void clean(const std::filesystem::path& file, GridField& field, const FitOptions& options, Repair& repair) {
   std::vector<std::uint32_t> part;
   const std::vector<std::size_t> size = parts_of(field, true, part);
   repair.pieces = size.size();
   if (size.empty()) refuse(file, "expected an inside thicker than a third of the error", "none", "ask for a smaller --error");
-  if (size.size() > 1) {
-    if (pieces == Pieces::Refuse) refuse(file, "expected voxels in one piece", std::to_string(size.size()) + " pieces", "choose the largest by --pieces largest");
-    const auto largest = static_cast<std::uint32_t>(std::max_element(size.begin(), size.end()) - size.begin());
-    for (std::size_t n = 0; n < part.size(); ++n) {
-      if (part[n] != largest && part[n] != kNone) field.value[n] = -field.value[n];
-    }
-  }
-  const std::vector<std::size_t> around = parts_of(field, false, part);  // part 0 holds the border
-  repair.cavities = around.size() - 1;
+  if (size.size() > 1 && options.pieces == Pieces::Refuse) refuse(file, "expected voxels in one piece", std::to_string(size.size()) + " pieces", kPiecesHint);
+  const std::size_t kept = piece_of(file, std::vector<double>(size.begin(), size.end()), options.pieces == Pieces::Refuse ? 1 : options.piece);
   for (std::size_t n = 0; n < part.size(); ++n) {
-    if (part[n] != 0 && part[n] != kNone) field.value[n] = std::max(-field.value[n], std::numeric_limits<float>::min());
+    if (part[n] != kept && part[n] != kNoPart) field.value[n] = -field.value[n];
   }
+  repair.cavities = fill_cavities(field);
 }
 
 }  // namespace
@@ -267,13 +162,10 @@ Mesh surface_of_volume(const std::filesystem::path& file, Volume volume, const F
   heed_scope();
   Reduced reduced = reduce(volume, choice, box, options.error);
   volume.value = {};
-  clean(file, reduced.field, options.pieces, repair);
+  clean(file, reduced.field, options, repair);
   heed_scope();
-  implicit::MarchOptions march;
-  march.lattice.cell = 1.0;
-  Mesh mesh = implicit::march_cubes(reduced.field, march, executor);
+  Mesh mesh = surface_of_grid(reduced.field, executor);
   for (Vec3& p : mesh.position) p = volume.origin + volume.axes * reduced.index_of(p);
-  mesh.normal.clear();
   return mesh;
 }
 

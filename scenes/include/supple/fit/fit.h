@@ -17,7 +17,7 @@ namespace supple::fit {
 /// What is done with data of several pieces that do not touch.
 enum class Pieces : std::uint8_t {
   Refuse,   ///< an error
-  Largest,  ///< the one with the largest volume is fitted
+  Largest,  ///< the one with the largest volume is fitted, or another one, see `piece`
 };
 
 enum class Kind : std::uint8_t {
@@ -48,6 +48,7 @@ struct FitOptions {
   std::uint32_t particles = 200; ///< of the object; in [1, 10000]
   std::uint32_t primitives = 2000;  ///< at most; in [1, 10000]
   Pieces pieces = Pieces::Refuse;
+  std::uint32_t piece = 1;       ///< with Pieces::Largest: which one, counted from the largest; >= 1
   Kind kind = Kind::Solid;
   std::optional<double> thickness{};  ///< of a shell [m]; absent: a third of the distance between particles
   VolumeOptions volume{};
